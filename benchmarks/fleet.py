@@ -108,7 +108,7 @@ def check(folder: Path, sample: int, verdicts: Path, out: Path | None, measured:
         with tempfile.TemporaryDirectory() as place:
             alone = Path(place)
             try:
-                deliver(read_set(folder / name), *(alone / n for n in FILES[:3]))
+                deliver(read_set(folder / name), alone)
             except InputError as error:
                 same = json.loads((found[name] / FAILED).read_text())["reason"] == str(error)
             else:

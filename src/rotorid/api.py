@@ -82,8 +82,7 @@ def verdict(
     with warnings.catch_warnings(), TemporaryDirectory() as folder, hears:
         warnings.simplefilter("ignore")
         analysis = analysis_of(recordings)
-        paths = [Path(folder) / file for file in FILES]
-        found = write_files(analysis, *paths[:3])
+        found = write_files(analysis, Path(folder))
         there = [path for name in (*FILES, *OTHERS) if (path := Path(folder) / name).exists()]
         texts = {path.name: path.read_text(encoding="utf-8") for path in there}
     return Result(found, texts, analysis)

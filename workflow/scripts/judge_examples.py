@@ -61,9 +61,7 @@ def main(cases: Mapping[str, str], out: Mapping[str, str], folder: str) -> None:
     channels, effects, locations, traces = [], [], [], []
     for name, recordings in recorded(cases).items():
         analysis = analysis_of(recordings)
-        place = Path(folder) / name
-        files = [place / file for file in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-        verdict = json.loads(write_files(analysis, *files).text())
+        verdict = json.loads(write_files(analysis, Path(folder) / name).text())
         state["examples"][name] = {
             **quoted.said(verdict),
             "runs": len(recordings.runs),

@@ -13,21 +13,16 @@ from rotorid.report.deliver import deliver
 from rotorid_lab import log
 
 
-def main(folder: str, verdict: str, page: str, improved: str, off: list[str]) -> None:
-    """Analyse the set in `folder`, without the rules named in `off`, and write the three files."""
-    log.progress(deliver(read_set(Path(folder)), Path(verdict), Path(page), Path(improved), off).sentence)
+def main(folder: str, target: str, off: list[str]) -> None:
+    """Analyse the set in `folder`, without the rules named in `off`, and write the files into `target`."""
+    log.progress(deliver(read_set(Path(folder)), Path(target), off).sentence)
 
 
 if __name__ == "__main__":
     with log.to(snakemake.log[0]):
         try:
-            main(
-                folder=snakemake.params.folder,
-                verdict=snakemake.output.verdict,
-                page=snakemake.output.page,
-                improved=snakemake.output.improved,
-                off=snakemake.params.off,
-            )
+            target = Path(snakemake.output.verdict).parent
+            main(folder=snakemake.params.folder, target=str(target), off=snakemake.params.off)
         except OSError as error:
             what = f"{error.filename}: {error.strerror}" if error.filename else str(error)
             sys.exit(f"rotorid: {what}; nothing was written")

@@ -198,6 +198,16 @@ def _unexpected(error: Exception) -> str:
 
 
 @contextmanager
+def heard(command: str, say: Callable[[str], None] | None = None) -> Iterator[Waiting]:
+    """Hear of the steps inside, next to earlier runs of a command; a run that ends well is added to the record."""
+    waiting = Waiting(read_record().get(command, []), say)
+    with heard_by(waiting.heard):
+        yield waiting
+    waiting.heard(())
+    keep(command, waiting.done)
+
+
+@contextmanager
 def progress(command: str, quiet: bool = False) -> Iterator[None]:
     """Show at which step a command is, since when, and how long is left where earlier runs of it tell.
 
@@ -209,14 +219,11 @@ def progress(command: str, quiet: bool = False) -> Iterator[None]:
     from rich.text import Text
 
     terminal = sys.stderr.isatty()
-    say = None if quiet or terminal else partial(typer.echo, err=True)
-    waiting = Waiting(read_record().get(command, []), say)
+    with heard(command, None if quiet or terminal else partial(typer.echo, err=True)) as waiting:
 
-    def line() -> Text:
-        return Text(waiting.line(), no_wrap=True, overflow="ellipsis")
+        def line() -> Text:
+            return Text(waiting.line(), no_wrap=True, overflow="ellipsis")
 
-    shown = Live(get_renderable=line, console=Console(stderr=True), transient=True) if terminal and not quiet else None
-    with shown or nullcontext(), heard_by(waiting.heard):
-        yield
-    waiting.heard(())
-    keep(command, waiting.done)
+        kept_up_to_date = Live(get_renderable=line, console=Console(stderr=True), transient=True)
+        with kept_up_to_date if terminal and not quiet else nullcontext():
+            yield

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rotorid.cli.console import one_sentence, progress
 from rotorid.cli.junit import as_junit
-from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile
+from rotorid.cli.sets import Like, MappingFile, MassKg, Quiet, Stated, VehicleFile, log_by_log
 from rotorid.cli.verdicts import JunitFile
 from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
@@ -30,7 +29,7 @@ def history(
     good: Annotated[int, typer.Option("--good", min=1, help="How many of the first sets are surely good.")] = 3,
     as_json: Annotated[bool, typer.Option("--json", help="Print the events as JSON.")] = False,
     junit: JunitFile = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    quiet: Quiet = False,
     ci: Annotated[bool, typer.Option("--ci", help="Exit code 1 where something changed.")] = False,
     mass_kg: MassKg = None,
     like: Like = None,
@@ -55,7 +54,7 @@ def history(
             from rotorid.report.fleet import history as history_of
             from rotorid.report.fleet import vehicle_page
 
-            sets = _sets_in(folder, left_out, mass_kg, like, vehicle, mapping)
+            sets = _sets_in(folder, left_out, Stated(mass_kg, like, vehicle, mapping))
             if len(sets) <= good:
                 for line in left_out:
                     typer.echo(f"! {line}", err=True)
@@ -100,19 +99,10 @@ def history(
         raise typer.Exit(1)
 
 
-def _sets_in(
-    folder: Path,
-    left_out: list[str],
-    mass_kg: float | None,
-    like: str | None,
-    vehicle: Path | None,
-    mapping: Path | None,
-) -> list[RecordingSet]:
+def _sets_in(folder: Path, left_out: list[str], stated: Stated) -> list[RecordingSet]:
     """Sets and logs of a folder in the order they were flown; all logs get one vehicle. What cannot be used is said."""
     from rotorid.recordings import read_set
     from rotorid.recordings.files import VEHICLE, is_bag
-    from rotorid.recordings.importers.logfile import set_of_logs
-    from rotorid.recordings.importers.mapping import read_mapping
     from rotorid.report.fleet import day_of
 
     if not folder.is_dir():
@@ -120,19 +110,15 @@ def _sets_in(
     if (folder / VEHICLE).is_file():
         raise InputError(f"{folder}: is one recording set; expected a folder of several, or of logs")
     paths = [p for p in folder.iterdir() if not p.name.startswith(".")]
-    columns, out = read_mapping(mapping) if mapping else None, []
-    with TemporaryDirectory() as made:
+    out = []
+    with log_by_log(stated) as made_of:
         for path in sorted(paths, key=lambda p: (day_of(p.name), p.name)):
             try:
                 if not path.is_dir() or is_bag(path):
                     if path.suffix.lower() in (".md", ".txt", ".yaml", ".json", ".html", ".pdf"):
                         continue
                     with step("importing"):
-                        own = set_of_logs([path], path.name.split(".")[0], mass_kg, like, vehicle, columns)
-                    if vehicle is None:
-                        vehicle = Path(made) / VEHICLE
-                        vehicle.write_text(own.vehicle_text, encoding="utf-8")
-                    found = own.recordings()
+                        found = made_of(path, path.name.split(".")[0]).recordings()
                 elif (path / VEHICLE).is_file():
                     found = read_set(path)
                 else:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotorid.cli.console import one_sentence, progress
-from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, name_of, set_of
+from rotorid.cli.sets import AsJson, Like, MappingFile, MassKg, Quiet, Stated, VehicleFile, name_of, set_of
 from rotorid.errors import InputError
 from rotorid.io.text.writing import copy_together, staging, write_texts
 from rotorid.steps import step
@@ -38,7 +38,7 @@ def model(
     like: Like = None,
     vehicle: VehicleFile = None,
     mapping: MappingFile = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Identify a vehicle from its logs and write it for a simulator, flown next to the log.
 
@@ -61,14 +61,14 @@ def model(
 
         is_set = len(paths) == 1 and (paths[0] / "vehicle.yaml").is_file() and not is_bag(paths[0])
         target = out or Path(f"{name_of(paths[0])}-{to}")
-        folder = set_of(paths, is_set, target, quiet, mass_kg, like, vehicle, mapping)
+        folder = set_of(paths, is_set, target, quiet, Stated(mass_kg, like, vehicle, mapping))
         written, said = _write_model(folder, target, to, quiet)
         for sentence in said:
             typer.echo(sentence)
         typer.echo(", ".join(str(path) for path in written))
 
 
-def _write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tuple[list[Path], list[str]]:
+def _write_model(folder: Path, target: Path, to: str, quiet: bool) -> tuple[list[Path], list[str]]:
     """Judge the set in `folder`, write verdict, export and comparison into `target`; the files, and what to say."""
     with progress("model", quiet), warnings.catch_warnings(), staging(target / "model") as aside:
         warnings.simplefilter("ignore")
@@ -78,11 +78,12 @@ def _write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tup
         from rotorid.recordings import read_vehicle
         from rotorid.report.deliver import FILES, OTHERS, analysis_of, write_files
         from rotorid.report.next_to_log import next_to_log
+        from rotorid.report.plots.next_to_log import draw
         from rotorid.vehicle.exports import export_vehicle
         from rotorid.vehicle.exports.autopilots import gazebo_airframe
 
         analysis = analysis_of(recordings)
-        verdict = write_files(analysis, *(aside / name for name in FILES[:3]))
+        verdict = write_files(analysis, aside)
         improved = read_vehicle(aside / FILES[2])
         exported = gazebo_airframe(improved) if to == "sdf" else export_vehicle(improved, to)
         texts = {exported.file_name: exported.text, **exported.companions}
@@ -93,32 +94,15 @@ def _write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tup
         try:
             with step("flying it next to the log"):
                 found = next_to_log(analysis, to, exported)
-            written += _comparison(found, aside)
+            found.table().to_csv(aside / "next_to_log.csv", index=False)
+            draw(found, aside / "next_to_log.png")
+            written += ["next_to_log.csv", "next_to_log.png"]
             first, *rest = found.sentences()
             said += [first, *(f"  - {sentence}" for sentence in rest)]
         except InputError as error:
             said.append(f"not flown next to the log: {error}")
         copy_together(aside, target, FILES[0], OTHERS)
         return [target / name for name in written], said
-
-
-def _comparison(found, folder: Path) -> tuple[str, str]:
-    """Write `next_to_log.csv` (a row a model and channel) and `next_to_log.png`; returns their names."""
-    import pandas as pd
-
-    from rotorid.mismatch.deliver.flown import UNITS
-    from rotorid.report.plots.next_to_log import draw
-
-    rows = [
-        (model, channel, found.error(model, channel), UNITS[channel], len(found.windows))
-        for model, channels in found.errors.items()
-        for channel in channels
-    ]
-    names = "next_to_log.csv", "next_to_log.png"
-    columns = ["model", "channel", "rms_error", "unit", "windows"]
-    pd.DataFrame(rows, columns=columns).to_csv(folder / names[0], index=False)
-    draw(found, folder / names[1])
-    return names
 
 
 def simulate(
@@ -214,7 +198,7 @@ def parameters(
     like: Like = None,
     vehicle: VehicleFile = None,
     mapping: MappingFile = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of text.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """State what flights determine of an autopilot's parameters, each with its 95 % interval, and write a file to load.
 

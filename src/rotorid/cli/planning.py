@@ -10,13 +10,15 @@ import json
 import re
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from rotorid.cli.console import one_sentence, progress
+from rotorid.cli.sets import Quiet
 from rotorid.errors import InputError
 from rotorid.io.text.wording import neighbour
 from rotorid.io.text.writing import write_texts
@@ -41,7 +43,7 @@ def plan(
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the plan; default VERDICT/plan.")] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Find the flight that settles what a verdict left open, and write it for the vehicle.
 
@@ -80,19 +82,12 @@ def plan(
 
                 made = plan_session(known_instrument_from(source, content), allowed)
             files, said = write(made, target), text(made)
-            picture = target / "plan.png" if made.pieces else None
-            _onto_page(folder / "report.html", source.name, said, picture)
+            picture = (target / "plan.png").read_bytes() if made.pieces else None
+            if (page := folder / "report.html").is_file():
+                write_texts({page: with_plan(page.read_text(encoding="utf-8"), source.name, said, picture)})
         for line in said:
             typer.echo(line)
         typer.echo(f"{files[0].parent}: {', '.join(f.name for f in files)}")
-
-
-def _onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> None:
-    """Put the plan on the verdict's page, where there is one."""
-    if not page.is_file():
-        return
-    content = with_plan(page.read_text(encoding="utf-8"), name, said, picture.read_bytes() if picture else None)
-    write_texts({page: content})
 
 
 def _wished(texts: list[str]) -> dict[str, float]:
@@ -148,7 +143,7 @@ def together(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for the results; default FIRST+LATER-verdict.")
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Judge a set together with those flown later, and say what they settled.
 
@@ -170,9 +165,8 @@ def together(
             with step("the first set alone"):
                 before = open_classes(analysis_of(sets[0]))
             analysis = analysis_of(whole)
-            analysis = type(analysis)(**{**vars(analysis), "notes": (*analysis.notes, *notes)})
-            files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-            said = write_files(analysis, *files)
+            analysis = replace(analysis, notes=(*analysis.notes, *notes))
+            said = write_files(analysis, target)
             found = answers(before, analysis.findings)
             write_texts({target / "answers.json": json.dumps(found, indent=1) + "\n"})
         typer.echo(said.sentence)
@@ -185,10 +179,10 @@ def together(
         typer.echo(f"{target / 'report.html'}")
 
 
-def _section(name: str, said: Sequence[str], picture: bytes | None = None) -> Markup:
-    """The sentences of a plan for a set as HTML, and its picture (PNG) where there is one.
+def with_plan(page: str, name: str, said: Sequence[str], picture: bytes | None = None) -> str:
+    """A verdict's page with the sentences of a plan for a set, and its picture (PNG) where there is one.
 
-    Sentences that are set in belong to the first: its steps.
+    Sentences that are set in belong to the first: its steps. A page without that section stays as it is.
     """
     first = Markup("<br>").join([said[0], *(line.strip() for line in said if line.startswith("  "))])
     others = [line for line in said[1:] if not line.startswith("  ")]
@@ -198,10 +192,4 @@ def _section(name: str, said: Sequence[str], picture: bytes | None = None) -> Ma
         data = base64.b64encode(picture).decode()
         words = f"What is planned for {name}, step by step, and the expected separations"
         out += Markup('<img style="max-width:100%" alt="{}" src="data:image/png;base64,{}">').format(words, data)
-    return out
-
-
-def with_plan(page: str, name: str, said: Sequence[str], picture: bytes | None = None) -> str:
-    """A verdict's page with the plan in it; a page without that section as it is."""
-    made = f"{OPEN}{escape(_section(name, said, picture))}{_CLOSE}"
-    return SECTION.sub(lambda found: found[1] + made + found[2], page, count=1)
+    return SECTION.sub(lambda found: f"{found[1]}{OPEN}{out}{_CLOSE}{found[2]}", page, count=1)

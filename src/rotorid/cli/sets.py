@@ -9,8 +9,12 @@ import json
 import math
 import re
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -22,6 +26,7 @@ from rotorid.io.text.writing import write_texts
 
 if TYPE_CHECKING:
     from rotorid.recordings.importers.logfile import SetOfLogs
+    from rotorid.recordings.importers.mapping import Mapping
 
 Like = Annotated[
     str | None,
@@ -32,6 +37,8 @@ VehicleFile = Annotated[
     Path | None, typer.Option("--vehicle", help="A vehicle.yaml to take as it is, in place of a proposal.")
 ]
 MappingFile = Annotated[Path | None, typer.Option("--mapping", help="What the columns of a CSV or Parquet file are.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON in place of text.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")]
 
 
 def import_logs(
@@ -50,7 +57,7 @@ def import_logs(
         Path | None, typer.Option(help="Look at a CSV or Parquet file, write what its columns seem to be, and stop.")
     ] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="Write runs as CSV in place of Parquet.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of text.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Turn logs of one vehicle into a recording set: a folder with a run a flight and a `vehicle.yaml`.
 
@@ -70,10 +77,17 @@ def import_logs(
         # `flight` of flight.ulg, `flight-set` of the bag in the folder flight
         name, is_folder = (logs[0].resolve().name, True) if logs[0].is_dir() else (logs[0].name, False)
         folder = out or Path((name.split(".")[0] or "flights") + "-set" * is_folder)
-        made = make_set(logs, folder, mass_kg, like, vehicle, mapping, as_csv)
-        from rotorid.recordings.sufficient import LEAST_SINGLE_S
+        made = make_set(logs, folder, Stated(mass_kg, like, vehicle, mapping), as_csv)
+        from rotorid.recordings import read_set
+        from rotorid.recordings.check import check_run
+        from rotorid.recordings.sufficient import LEAST_SINGLE_S, sufficient
 
-        durations, refused = _contents(folder)
+        recordings, refused = read_set(folder), ""
+        durations = {check.name: check.duration_s for check in map(check_run, recordings.runs)}
+        try:  # the very look that the verdict has first: a single flight must be long enough to hold out a part of it
+            sufficient(recordings)
+        except InputError as error:
+            refused = str(error)
         if as_json:
             said = {
                 "set": str(folder),
@@ -129,31 +143,60 @@ def _write_mapping(logs: list[Path], target: Path, as_json: bool) -> None:
     typer.echo(f"Next: {first}, then `rotorid import {logs[0]} --mapping {target} --like NAME --mass-kg KG`")
 
 
-def make_set(
-    logs: list[Path],
-    folder: Path,
-    mass_kg: float | None = None,
-    like: str | None = None,
-    vehicle_file: Path | None = None,
-    mapping_file: Path | None = None,
-    as_csv: bool = False,
-) -> SetOfLogs:
+@dataclass(frozen=True)
+class Stated:
+    """What is stated of the vehicle whose logs are given; what is not is proposed."""
+
+    mass_kg: float | None = None
+    like: str | None = None
+    """A template vehicle."""
+    vehicle: Path | None = None
+    """A `vehicle.yaml`, in place of mass and template."""
+    mapping: Path | None = None
+    """What the columns of a table are."""
+
+    def columns(self) -> Mapping | None:
+        """The mapping's content."""
+        from rotorid.recordings.importers.mapping import read_mapping
+
+        return read_mapping(self.mapping) if self.mapping else None
+
+
+@contextmanager
+def log_by_log(stated: Stated) -> Iterator[Callable[[Path, str], SetOfLogs]]:
+    """A function that makes a set of one log, by its path and a name; all have one vehicle, that of the first log."""
+    from rotorid.recordings.importers.logfile import set_of_logs
+
+    vehicle, columns = stated.vehicle, stated.columns()
+    with TemporaryDirectory() as folder:
+
+        def made_of(path: Path, name: str) -> SetOfLogs:
+            nonlocal vehicle
+            found = set_of_logs([path], name, stated.mass_kg, stated.like, vehicle, columns)
+            if vehicle is None:
+                vehicle = Path(folder) / "vehicle.yaml"
+                vehicle.write_text(found.vehicle_text, encoding="utf-8")
+            return found
+
+        yield made_of
+
+
+def make_set(logs: list[Path], folder: Path, stated: Stated, as_csv: bool = False) -> SetOfLogs:
     """Write the set `folder` of logs of one vehicle; a `vehicle.yaml` that is there already stays."""
     from rotorid.recordings.importers.logfile import set_of_logs
-    from rotorid.recordings.importers.mapping import read_mapping
 
-    mapping = read_mapping(mapping_file) if mapping_file else None
-    found = set_of_logs(logs, folder.name, mass_kg, like, vehicle_file, mapping, folder / "vehicle.yaml")
+    there, columns = folder / "vehicle.yaml", stated.columns()
+    found = set_of_logs(logs, folder.name, stated.mass_kg, stated.like, stated.vehicle, columns, there)
     found.write(folder, as_csv)
     return found
 
 
-def set_of(paths: list[Path], is_set: bool, target: Path, quiet: bool, *vehicle) -> Path:
-    """The folder of a set: the one that is given, or below `target` one made of logs, as `make_set` takes them."""
+def set_of(paths: list[Path], is_set: bool, target: Path, quiet: bool, stated: Stated) -> Path:
+    """The folder of a set: the one that is given, or below `target` one made of logs."""
     if is_set:
         return paths[0]
     folder = target / name_of(paths[0])
-    made = make_set(paths, folder, *vehicle)
+    made = make_set(paths, folder, stated)
     if not quiet:
         _print_notes(made, folder)
     return folder
@@ -176,24 +219,6 @@ def _print_notes(made: SetOfLogs, folder: Path) -> None:
         typer.echo("Proposed, not measured (marked PROPOSED in vehicle.yaml):")
         for remark in made.remarks:
             typer.echo(f"  - {remark}")
-
-
-def _contents(folder: Path) -> tuple[dict[str, float], str]:
-    """To the runs of a set their lengths, s, and why `rotorid verdict` would refuse the set; empty where it would not.
-
-    The very look that the verdict has first: a single flight must be long enough to hold out a part of it.
-    """
-    from rotorid.recordings import read_set
-    from rotorid.recordings.check import check_run
-    from rotorid.recordings.sufficient import sufficient
-
-    recordings = read_set(folder)
-    durations = {check.name: check.duration_s for check in map(check_run, recordings.runs)}
-    try:
-        sufficient(recordings)
-    except InputError as error:
-        return durations, str(error)
-    return durations, ""
 
 
 def init(
@@ -264,7 +289,7 @@ def init(
 
 def check(
     folder: Annotated[Path, typer.Argument(help="A recording set, or a folder of sets.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of text.")] = False,
+    as_json: AsJson = False,
     renew: Annotated[
         bool, typer.Option("--renew", help="List the runs anew in manifest.json, after runs were changed by hand.")
     ] = False,

@@ -16,14 +16,13 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from statistics import median
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rotorid.cli.console import keep, one_sentence, progress, read_record
 from rotorid.cli.junit import as_junit
-from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, name_of, set_of
+from rotorid.cli.sets import Like, MappingFile, MassKg, Quiet, Stated, VehicleFile, log_by_log, name_of, set_of
 from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
 from rotorid.steps import step
@@ -59,7 +58,7 @@ def verdict(
         ),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print verdict.json on standard output.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    quiet: Quiet = False,
     ci: Annotated[
         bool, typer.Option("--ci", help="Exit code 1 where the set is not judged, or by the two limits below.")
     ] = False,
@@ -92,18 +91,18 @@ def verdict(
 
         start, limit = time.monotonic(), share_of(max_unexplained)
         is_set = len(paths) == 1 and paths[0].is_dir() and not is_bag(paths[0])
-        target = out or Path(f"{name_of(paths[0])}-verdict")
+        target, stated = out or Path(f"{name_of(paths[0])}-verdict"), Stated(mass_kg, like, vehicle, mapping)
         if is_set:
             folder = paths[0]
-            ignored = {"--mass-kg": mass_kg, "--like": like, "--vehicle": vehicle, "--mapping": mapping}
-            if given := [name for name, value in ignored.items() if value is not None]:
+            if given := [f"--{n.replace('_', '-')}" for n, value in vars(stated).items() if value is not None]:
                 play = "plays" if len(given) == 1 else "play"
                 said = f"{folder} is a recording set, whose vehicle is that of {folder / 'vehicle.yaml'}"
                 typer.echo(f"rotorid: {' and '.join(given)} {play} no part: {said}", err=True)
             if not (folder / "vehicle.yaml").is_file():
                 raise InputError(_no_vehicle(folder))
-        folder = set_of(paths, is_set, target, quiet or as_json, mass_kg, like, vehicle, mapping)
-        found = deliver_set(folder, target, quiet, series)
+        folder = set_of(paths, is_set, target, quiet or as_json, stated)
+        with progress("verdict", quiet):
+            found = write_verdict(folder, target, series)
         if as_json:
             typer.echo((target / "verdict.json").read_text(encoding="utf-8"), nl=False)
         else:
@@ -156,17 +155,11 @@ def faults_of(verdict: Verdict, most: float, no_doubts: bool) -> list[str]:
     return [sentence for sentences in checks_of(verdict, most, no_doubts).values() for sentence in sentences]
 
 
-def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -> Verdict:
+def write_verdict(folder: Path, target: Path, series: bool = False) -> Verdict:
     """Analyse the set in `folder`, write the files into `target`, and return the verdict.
 
     With `series` the residuals are written, too, as `series.parquet` and for the viewers whose packages are installed.
     """
-    with progress("verdict", quiet):
-        return write_verdict(folder, target, series)
-
-
-def write_verdict(folder: Path, target: Path, series: bool = False) -> Verdict:
-    """`deliver_set` without showing how far it is; who listens to `rotorid.steps` hears it."""
     from rotorid.recordings.tables import NO_PARQUET, parquet_is_here, write_table
 
     if series and not parquet_is_here():
@@ -181,8 +174,7 @@ def write_verdict(folder: Path, target: Path, series: bool = False) -> Verdict:
         from rotorid.report.deliver import analysis_of, write_files
 
         analysis = analysis_of(recordings)
-        files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-        verdict = write_files(analysis, *files)
+        verdict = write_files(analysis, target)
         if series:
             from rotorid.report.deliver import residuals_of
             from rotorid.report.series_files import write_viewers
@@ -218,7 +210,7 @@ def compare(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="File for the result as JSON.")] = None,
     page: Annotated[Path | None, typer.Option("--page", help="File for a page with figures (HTML).")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    quiet: Quiet = False,
     ci: Annotated[bool, typer.Option("--ci", help="Exit code 1 where a change is stated (probability 0.99).")] = False,
     junit: JunitFile = None,
     mass_kg: MassKg = None,
@@ -257,9 +249,13 @@ def compare(
                 f"{sets[0]}: nothing to compare it with; expected two sets or more, the last one in question"
             )
         start = time.monotonic()
-        watch = partial(progress, quiet=quiet)
-        tell = _nothing if as_json else _each_line
-        found, changed = compared(sets, tell, watch, mass_kg, like, vehicle, mapping)
+
+        def tell(sentences: Sequence[str]) -> None:
+            for line in () if as_json else sentences:  # the JSON has them at the end
+                typer.echo(line)
+
+        stated = Stated(mass_kg, like, vehicle, mapping)
+        found, changed = compared(sets, tell, partial(progress, quiet=quiet), stated)
         text = changes_text(found, changed)
         texts = {} if out is None else {out: text}
         if page is not None:
@@ -275,15 +271,6 @@ def compare(
     differs = found.level_1 is not None and bool(found.level_1.stated)
     if ci and (differs or any(c.status in ("established", "ambiguous") for c in found.changes)):
         raise typer.Exit(1)
-
-
-def _each_line(sentences: Sequence[str]) -> None:
-    for line in sentences:
-        typer.echo(line)
-
-
-def _nothing(sentences: Sequence[str]) -> None:
-    """The JSON has them at the end."""
 
 
 def changes_text(found: Changes, changed: Sequence[Differing]) -> str:
@@ -313,10 +300,7 @@ def compared(
     paths: Sequence[Path],
     tell: Callable[[Sequence[str]], None],
     watch: Callable[[str], AbstractContextManager],
-    mass_kg: float | None = None,
-    like: str | None = None,
-    vehicle: Path | None = None,
-    mapping: Path | None = None,
+    stated: Stated,
 ) -> tuple[Changes, tuple[Differing, ...]]:
     """What changed from all sets and logs but the last one to it, and the autopilot's parameters that differ.
 
@@ -326,7 +310,7 @@ def compared(
     with watch("compare: what differs"):
         from rotorid.recordings.settings import differing, differing_sentences
 
-        given = read_given(paths, mass_kg, like, vehicle, mapping)
+        given = read_given(paths, stated)
         changed = differing([own for one in given[:-1] for own in one.settings], [own for own in given[-1].settings])
         tell(differing_sentences(changed, MOST_PARAMETERS))
         from rotorid.mismatch.changes.level_one import as_one, of_one_vehicle, seen_by
@@ -369,13 +353,7 @@ class Given:
     """Parameters of the autopilot, one entry a log; empty where they are not known."""
 
 
-def read_given(
-    paths: Sequence[Path],
-    mass_kg: float | None = None,
-    like: str | None = None,
-    vehicle: Path | None = None,
-    mapping: Path | None = None,
-) -> list[Given]:
+def read_given(paths: Sequence[Path], stated: Stated) -> list[Given]:
     """The sets of folders and logs, each log a set of its own; all logs have one vehicle.
 
     `log.bin#2` is the second flight in a log, `set#2` the second run of a set, as `rotorid import` lists them.
@@ -387,26 +365,17 @@ def read_given(
     """
     from rotorid.recordings import read_set
     from rotorid.recordings.files import is_bag
-    from rotorid.recordings.importers.logfile import set_of_logs
-    from rotorid.recordings.importers.mapping import read_mapping
     from rotorid.recordings.settings import read_settings
 
-    out = []
-    columns = read_mapping(mapping) if mapping else None
-    with TemporaryDirectory() as folder:
-        sets: dict[Path, Given] = {}
+    out, sets = [], {}
+    with log_by_log(stated) as made_of:
         for whole in paths:
             path, number = one_flight(whole)
-            if path in sets:
-                pass
-            elif path.is_dir() and not is_bag(path):
+            if path not in sets and path.is_dir() and not is_bag(path):
                 sets[path] = Given(read_set(path), tuple(read_settings(path).values()))
-            else:
-                made = set_of_logs([path], path.stem, mass_kg, like, vehicle, columns)
+            elif path not in sets:
+                made = made_of(path, path.stem)
                 sets[path] = Given(made.recordings(), tuple(own for own in made.settings.values() if own))
-                if vehicle is None:
-                    vehicle = Path(folder) / "vehicle.yaml"
-                    vehicle.write_text(made.vehicle_text, encoding="utf-8")
             found = sets[path].recordings
             if number is not None:
                 if not 1 <= number <= len(found.runs):

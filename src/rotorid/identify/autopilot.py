@@ -171,30 +171,29 @@ def _fit_thrust(stretches: Sequence[Stretch], chosen: _ThrustMap, mass_kg: float
     used = [s for s in stretches if s.throttle is not None and not (chosen.in_grams and s.voltage is None)]
     if not used:
         return None
-    layout = _layout(used, chosen)
-    residuals = _residuals(used, chosen, layout, mass_kg)
-    start = layout.start.copy()
+    at, (start, low, high, scale, prior) = _layout(used, chosen)
+    shapes = slice(at["shape 0"], at["lag"])
     if not chosen.in_grams:
         mean = np.concatenate([s.throttle for s in used]).mean(keepdims=True)[None]
-        share = max(float(chosen.thrust(mean, None, start[layout.shapes]).mean()), 1e-3)
-        start[0] = np.log(gravity_m_s2 / share)
-    found = fit(residuals, start, (layout.low, layout.high), layout.scale, layout.prior)
+        share = max(float(chosen.thrust(mean, None, start[shapes]).mean()), 1e-3)
+        start[at["full"]] = np.log(gravity_m_s2 / share)
+    found = fit(_residuals(used, chosen, at, mass_kg), start, (low, high), scale, prior)
     volts = None
     if chosen.in_grams:
         volts = np.full((1, 1), np.mean(np.concatenate([s.voltage for s in used])))
 
     def lifted(values: np.ndarray, signal: float) -> float:
         """m/s² of all rotors at one signal."""
-        share = chosen.thrust(np.array([[signal]]), volts, values[layout.shapes])
+        share = chosen.thrust(np.array([[signal]]), volts, values[shapes])
         return float(share[0, 0]) * _per_share(values, chosen, mass_kg, used[0].throttle.shape[1])
 
     signals = np.concatenate([s.throttle.ravel() for s in used])
     # The exponential of the lag's logarithm: its interval stays positive.
-    log = found.of(lambda v: float(v[layout.lag]))
-    low, high = np.exp(np.clip(log.interval_95, -50, 50))
+    log = found.of(lambda v: float(v[at["lag"]]))
+    least_s, most_s = map(float, np.exp(np.clip(log.interval_95, -50, 50)))
     return (
-        [found.of(lambda v, k=k: float(v[k])) for k in range(*layout.shapes.indices(len(start)))],
-        EstimatedNumber(float(np.exp(log.value)), (float(low), float(high))),
+        [found.of(lambda v, k=k: float(v[k])) for k in range(shapes.start, shapes.stop)],
+        EstimatedNumber(float(np.exp(log.value)), (least_s, most_s)),
         found.of(lambda v: _solve(lambda u: lifted(v, u), gravity_m_s2)),
         found.of(lambda v: gravity_m_s2 / lifted(v, chosen.full_signal)),
         (float(np.quantile(signals, 0.01)), float(np.quantile(signals, 0.99))),
@@ -216,64 +215,38 @@ def _solve(rising: Callable[[float], float], wanted: float) -> float:
     return (low + high) / 2
 
 
-@dataclass(frozen=True)
-class _Layout:
-    """Which value is where."""
+def _layout(used: Sequence[Stretch], chosen: _ThrustMap) -> tuple[dict[str, int], np.ndarray]:
+    """Which value is where, by name, and (5, p) of each the start, lowest, highest, usual size and believed deviation.
 
-    shapes: slice
-    lag: int
-    zero: int
-    voltage: int | None
-    drift: dict[str, int]
-    motion: int | None
-    start: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    scale: np.ndarray
-    prior: np.ndarray
-    full_voltage: float
-
-
-def _layout(used: Sequence[Stretch], chosen: _ThrustMap) -> _Layout:
+    `full` is the gain, `shape i` are the map's numbers; `drift of RUN`, `axial` and `lift` are what else moves thrust.
+    """
     accelerometer_zero_m_s2 = 0.1  # Standard deviation of the error of an accelerometer's zero that is believed.
     voltage_moves = 0.01  # Share of the voltage that it must vary by for its part to be estimated.
-    rows: list[tuple[float, float, float, float, float]] = []
-
-    def add(start: float, low: float, high: float, scale: float, prior: float = np.inf) -> int:
-        rows.append((start, low, high, scale, prior))
-        return len(rows) - 1
-
+    rows: dict[str, tuple[float, float, float, float, float]] = {}
     if not chosen.in_grams:
-        add(np.log(25.0), np.log(2.0), np.log(1000.0), 0.1)
-    first = len(rows)
-    for shape in chosen.shapes:
-        add(shape.start, shape.low, shape.high, (shape.high - shape.low) / 10, shape.believed)
-    shapes = slice(first, len(rows))
-    lag = add(np.log(0.04), *np.log(_TIME_CONSTANTS_S), 0.3)
-    zero = add(0.0, -2.0, 2.0, accelerometer_zero_m_s2, accelerometer_zero_m_s2)
-    voltage, drift, mean = None, {}, 1.0
-    if not chosen.in_grams:
-        if all(s.voltage is not None for s in used):
-            volts = np.concatenate([s.voltage for s in used])
-            mean = float(volts.mean())
-            if np.ptp(volts) > voltage_moves * mean:
-                voltage = add(1.0, -2.0, 5.0, 0.5)
-        else:
-            drift = {name: add(0.0, -1.0, 1.0, _DRIFT) for name in dict.fromkeys(s.run for s in used)}
-    motion = None
+        rows["full"] = np.log(25.0), np.log(2.0), np.log(1000.0), 0.1, np.inf
+    for i, shape in enumerate(chosen.shapes):
+        rows[f"shape {i}"] = shape.start, shape.low, shape.high, (shape.high - shape.low) / 10, shape.believed
+    rows["lag"] = np.log(0.04), *np.log(_TIME_CONSTANTS_S), 0.3, np.inf
+    rows["zero"] = 0.0, -2.0, 2.0, accelerometer_zero_m_s2, accelerometer_zero_m_s2
+    if not chosen.in_grams and all(s.voltage is not None for s in used):
+        volts = np.concatenate([s.voltage for s in used])
+        if np.ptp(volts) > voltage_moves * float(volts.mean()):
+            rows["voltage"] = 1.0, -2.0, 5.0, 0.5, np.inf
+    elif not chosen.in_grams:
+        rows |= {f"drift of {s.run}": (0.0, -1.0, 1.0, _DRIFT, np.inf) for s in used}
     if all(s.attitude is not None and s.velocity is not None for s in used):
-        motion = add(0.0, -5.0, 5.0, _AXIAL)
-        add(0.0, -1.0, 1.0, _LIFT)
-    columns = np.array(rows).T
-    return _Layout(shapes, lag, zero, voltage, drift, motion, *columns, mean)
+        rows |= {"axial": (0.0, -5.0, 5.0, _AXIAL, np.inf), "lift": (0.0, -1.0, 1.0, _LIFT, np.inf)}
+    return {name: place for place, name in enumerate(rows)}, np.array(list(rows.values())).T
 
 
-def _residuals(used: Sequence[Stretch], chosen: _ThrustMap, layout: _Layout, mass_kg: float):
+def _residuals(used: Sequence[Stretch], chosen: _ThrustMap, at: dict[str, int], mass_kg: float):
     """The function from values to the residuals of each stretch, m/s², averaged down to `_RATE_HZ`."""
+    full_voltage = float(np.concatenate([s.voltage for s in used]).mean()) if "voltage" in at else 1.0
     prepared = []
     for s in used:
         through = None
-        if layout.motion is not None:
+        if "axial" in at:
             body = np.einsum("nji,nj->ni", s.attitude, s.velocity)
             through = np.stack([body[:, 2], body[:, 0] ** 2 + body[:, 1] ** 2], axis=1)
         middle, length = s.time_s.mean(), max(np.ptp(s.time_s), 1e-9)
@@ -283,16 +256,16 @@ def _residuals(used: Sequence[Stretch], chosen: _ThrustMap, layout: _Layout, mas
         out = []
         for s, through, along, every in prepared:
             volts = None if s.voltage is None else s.voltage[:, None]
-            steady = np.maximum(chosen.thrust(s.throttle, volts, values[layout.shapes]), 0.0)
-            thrust = (lagging(np.sqrt(steady), s.dt_s, np.exp(values[layout.lag])) ** 2).mean(axis=1)
+            steady = np.maximum(chosen.thrust(s.throttle, volts, values[at["shape 0"] : at["lag"]]), 0.0)
+            thrust = (lagging(np.sqrt(steady), s.dt_s, np.exp(values[at["lag"]])) ** 2).mean(axis=1)
             up = thrust * _per_share(values, chosen, mass_kg, s.throttle.shape[1])
-            if layout.voltage is not None:
-                up = up * (s.voltage / layout.full_voltage) ** values[layout.voltage]
-            if s.run in layout.drift:
-                up = up * (1 + values[layout.drift[s.run]] * along)
-            up = up + values[layout.zero]
+            if "voltage" in at:
+                up = up * (s.voltage / full_voltage) ** values[at["voltage"]]
+            if f"drift of {s.run}" in at:
+                up = up * (1 + values[at[f"drift of {s.run}"]] * along)
+            up = up + values[at["zero"]]
             if through is not None:
-                up = up + through @ values[layout.motion : layout.motion + 2]
+                up = up + through @ values[at["axial"] : at["lift"] + 1]
             out.append(_averaged(-s.specific_force[:, 2] - up, every))
         return out
 
@@ -335,13 +308,10 @@ def _fit_drag(stretches: Sequence[Stretch]) -> tuple | None:
     if not used:
         return None
     runs = list(dict.fromkeys(s.run for s in used))
-    count = 5 + 2 * len(runs)
-    start = np.zeros(count)
-    start[:3] = 0.02, 0.02, 0.1
-    low = np.array([-0.2, -0.2, -1.0, -3, -3, *[-30.0] * (2 * len(runs))])
-    high = np.array([1.0, 1.0, 3.0, 3, 3, *[30.0] * (2 * len(runs))])
-    scale = np.array([0.02, 0.02, 0.1, _ZERO_M_S2, _ZERO_M_S2, *[2.0] * (2 * len(runs))])
-    prior = np.array([np.inf, np.inf, np.inf, _ZERO_M_S2, _ZERO_M_S2, *[wind_m_s] * (2 * len(runs))])
+    bluff, momentum = (0.02, -0.2, 1.0, 0.02, np.inf), (0.1, -1.0, 3.0, 0.1, np.inf)
+    zero, wind = (0.0, -3.0, 3.0, _ZERO_M_S2, _ZERO_M_S2), (0.0, -30.0, 30.0, 2.0, wind_m_s)
+    rows = [bluff, bluff, momentum, zero, zero, *[wind] * (2 * len(runs))]
+    start, low, high, scale, prior = np.array(rows).T
 
     def residuals(values: np.ndarray) -> list[np.ndarray]:
         out = []
@@ -355,10 +325,10 @@ def _fit_drag(stretches: Sequence[Stretch]) -> tuple | None:
         return out
 
     found = fit(residuals, start, (low, high), scale, prior)
-    of = [found.of(lambda v, k=k: float(v[k])) for k in range(count)]
+    of = [found.of(lambda v, k=k: float(v[k])) for k in range(len(rows))]
     across = np.concatenate([np.linalg.norm(s.velocity[:, :2], axis=1) for s in used])
-    wind = {run: (of[5 + 2 * k], of[6 + 2 * k]) for k, run in enumerate(runs)}
-    return of[:3], wind, float(np.quantile(across, 0.99))
+    winds = {run: (of[5 + 2 * k], of[6 + 2 * k]) for k, run in enumerate(runs)}
+    return of[:3], winds, float(np.quantile(across, 0.99))
 
 
 @dataclass(frozen=True)
@@ -385,17 +355,23 @@ def parameters_of(recordings: RecordingSet, to: str) -> tuple[AutopilotParameter
     """
     if to not in MAPS:
         near = get_close_matches(to, list(MAPS), 1)
-        raise InputError(
-            f"no autopilot is called {to!r}"
-            + (f"; did you mean {near[0]}?" if near else f", expected {', '.join(MAPS)}")
-        )
+        meant = f"; did you mean {near[0]}?" if near else f", expected {', '.join(MAPS)}"
+        raise InputError(f"no autopilot is called {to!r}{meant}")
     stretches = stretches_of(recordings)
     chosen, vehicle = MAPS[to], recordings.vehicle
     thrust = _fit_thrust(stretches, chosen, vehicle.mass_kg, vehicle.gravity_m_s2)
-    out = _missing(chosen, to) if thrust is None else _of_thrust(*thrust, chosen, to)
-    if to == "px4":
-        drag = _fit_drag(stretches)
-        out += _no_drag() if drag is None else _of_drag(*drag)
+    if thrust is not None:
+        out = _of_thrust(*thrust, chosen, to)
+    else:
+        with_volts = " together with the battery's voltage" if chosen.in_grams else ""
+        names = [s.name for s in chosen.shapes] + ([_HOVERS[to][0]] if to in _HOVERS else [])
+        why = f"it holds no signals of the motors (throttle_1 …){with_volts}"
+        out = [_nothing(name, "", why) for name in (*names, "hover_signal", "motor_time_constant_s")]
+    if to == "px4" and (drag := _fit_drag(stretches)) is not None:
+        out += _of_drag(*drag)
+    elif to == "px4":
+        units = {"EKF2_BCOEF_X": "kg/m²", "EKF2_BCOEF_Y": "kg/m²", "EKF2_MCOEF": "1/s"}
+        out += [_nothing(name, unit, "drag needs attitude and velocity") for name, unit in units.items()]
     return tuple(out)
 
 
@@ -410,19 +386,6 @@ def _stated(name, number: EstimatedNumber, unit, fine: bool, sentence, to_set=No
     return AutopilotParameter(
         name, number.value, number.interval_95, unit, fine, sentence, to_set if fine else None, decimals
     )
-
-
-def _missing(chosen: _ThrustMap, to: str) -> list[AutopilotParameter]:
-    why = "it holds no signals of the motors (throttle_1 …)"
-    if chosen.in_grams:
-        why += " together with the battery's voltage"
-    names = [s.name for s in chosen.shapes] + ([_HOVERS[to][0]] if to in _HOVERS else [])
-    return [_nothing(name, "", why) for name in (*names, "hover_signal", "motor_time_constant_s")]
-
-
-def _no_drag() -> list[AutopilotParameter]:
-    units = {"EKF2_BCOEF_X": "kg/m²", "EKF2_BCOEF_Y": "kg/m²", "EKF2_MCOEF": "1/s"}
-    return [_nothing(name, unit, "drag needs attitude and velocity") for name, unit in units.items()]
 
 
 def _of_thrust(shapes, lag, hover, share, throttle_range, chosen: _ThrustMap, to: str) -> list[AutopilotParameter]:

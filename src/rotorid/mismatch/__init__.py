@@ -47,6 +47,8 @@ OPEN = (
     "tell.consistency",
     "tell.forward",
     "tell.locate",
+    "tell.places",
+    "tell.sentences",
     "tell.steps",
     "tell.verdict",
 )

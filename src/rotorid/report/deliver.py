@@ -34,8 +34,8 @@ from rotorid.mismatch.deliver.files import (
     instruments_of,
     read_conditions,
     read_instruments,
+    text_of,
 )
-from rotorid.mismatch.deliver.files import text_of as file_text
 from rotorid.mismatch.deliver.flown import model_of
 from rotorid.mismatch.flight.fitted import Watch, unwatched
 from rotorid.mismatch.tell.forward import forward_channels, prove
@@ -54,11 +54,9 @@ OTHERS = (CONDITIONS, INSTRUMENTS)
 """Files that it has where there is something to write."""
 
 
-def deliver(
-    recordings: RecordingSet, verdict_path: Path, page_path: Path, improved_path: Path, off: Collection[str] = ()
-) -> Verdict:
-    """Analyse a set and write its verdict, its page and the improved vehicle; rules named in `off` are left out."""
-    return write_files(analysis_of(recordings, off), verdict_path, page_path, improved_path)
+def deliver(recordings: RecordingSet, folder: Path, off: Collection[str] = ()) -> Verdict:
+    """Analyse a set and write the files of its verdict into a folder; rules named in `off` are left out."""
+    return write_files(analysis_of(recordings, off), folder)
 
 
 @one_thread()
@@ -77,18 +75,13 @@ def analysis_of(recordings: RecordingSet, off: Collection[str] = (), watch: Watc
             from rotorid.mismatch.instrument.analyse import analyse_instrument
 
             analysis = analyse_instrument(usable)
-    without = tuple(f"Judged without the rule {name}: {rules.RULES[name].decides}" for name in sorted(asked.off))
-    analysis = replace(analysis, fired=dict(asked.fired), notes=(*without, *analysis.notes))
+    without = tuple(f"Judged without the rule {name}: {RULES[name].decides}" for name in sorted(asked.off))
     recordings = replace(analysis.recordings, left_out=usable.left_out)  # sets with corrected mistakes are made anew
-    analysis = replace(analysis, recordings=recordings, notes=(*usable.left_out, *analysis.notes))
-    return _with_rounded_model(with_doubts(analysis, usable))
-
-
-def _with_rounded_model(analysis: Analysis) -> Analysis:
-    """The analysis whose improved vehicle is stated, and simulated, to as many digits as the verdict states.
-
-    More digits are chance: the last ones of a sum depend on how many threads added it up.
-    """
+    notes = (*usable.left_out, *without, *analysis.notes)
+    analysis = replace(analysis, recordings=recordings, fired=dict(asked.fired), notes=notes)
+    analysis = with_doubts(analysis, usable)
+    # The improved vehicle is stated, and simulated, to as many digits as the verdict states. More digits are chance:
+    # the last ones of a sum depend on how many threads added it up.
     stated = Vehicle.model_validate(rounded(analysis.improved.model_dump()))
     findings = tuple(replace(f, values=tuple(rounded(list(map(float, f.values))))) for f in analysis.findings)
     return replace(analysis, improved=stated, findings=findings)
@@ -116,25 +109,21 @@ def _written(content: _Content, path: Path, read: Callable[[Path], _Content]) ->
     """Content as it is read back from its file, which is written where there is something to write."""
     if empty(content):
         return content
-    path.write_text(file_text(content), encoding="utf-8")
+    path.write_text(text_of(content), encoding="utf-8")
     return read(path)
 
 
 @one_thread()
-def write_files(analysis: Analysis, verdict_path: Path, page_path: Path, improved_path: Path) -> Verdict:
-    """Write what an analysis amounts to; what is taken home is read back and simulated as proof.
-
-    `conditions.yaml` and `instruments.yaml` are written next to the improved vehicle where there is something to write.
-    """
+def write_files(analysis: Analysis, folder: Path) -> Verdict:
+    """Write what an analysis amounts to, FILES and OTHERS; what is taken home is read back and simulated as proof."""
     locations = locate(analysis)
     improved = improved_vehicle(analysis)
-    others = [improved_path.with_name(name) for name in OTHERS]
-    paths = (verdict_path, page_path, improved_path, verdict_path.with_name("ledger.json"), *others)
-    with all_or_none(*paths, optional=others) as parts:
-        verdict_part, page_part, improved_part, ledger_part, *other_parts = parts
+    files, others = ([folder / name for name in names] for names in (FILES, OTHERS))
+    with all_or_none(*files, *others, optional=others) as parts:
+        verdict_part, page_part, improved_part, ledger_part, conditions_part, instruments_part = parts
         write_vehicle(improved, improved_part)
-        conditions = _written(conditions_of(analysis), other_parts[0], read_conditions)
-        instruments = _written(instruments_of(analysis), other_parts[1], read_instruments)
+        conditions = _written(conditions_of(analysis), conditions_part, read_conditions)
+        instruments = _written(instruments_of(analysis), instruments_part, read_instruments)
         reloaded = read_vehicle(improved_part)
         if analysis.instrument is None:
             forward, notes = forward_channels(analysis)
@@ -147,7 +136,7 @@ def write_files(analysis: Analysis, verdict_path: Path, page_path: Path, improve
         verdict = _with_first_details(make_verdict(analysis, locations, forward), analysis)
         verdict_part.write_text(verdict.text(), encoding="utf-8")
         decided = ledger(analysis, verdict)
-        ledger_part.write_text(text_of(decided), encoding="utf-8")
+        ledger_part.write_text(json.dumps(decided, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         page_part.write_text(make_page(analysis, verdict, notes, decided), encoding="utf-8")
     return verdict
 
@@ -162,8 +151,9 @@ def ledger(analysis: Analysis, verdict: Verdict) -> list[dict]:
     out += [_entry("within_trust", "values", sentence=text) for text in analysis.corrected]
     left = {"share_left": verdict.unexplained.share}
     out.append(_entry("word_from_numbers", verdict.verdict, left, verdict.unexplained.description))
-    out += [_entry(name, "search", {"fired": n}, RULES[name].decides) for name, n in sorted(analysis.fired.items())]
-    return [e for e in out if e]
+    return out + [
+        _entry(name, "search", {"fired": n}, RULES[name].decides) for name, n in sorted(analysis.fired.items())
+    ]
 
 
 def _of_finding(finding: Finding, analysis: Analysis) -> dict:
@@ -176,27 +166,24 @@ def _of_finding(finding: Finding, analysis: Analysis) -> dict:
     if finding.gain is not None:
         numbers |= dict(zip(("rmse_ratio", "low_95", "high_95"), finding.gain, strict=True))
     if finding.status == "not_established":
-        return _entry(finding.rule or "search", finding.id, numbers, finding.sentence)
-    if finding.status == "absorbed":
-        return _entry("absorbed_by_values", finding.id, numbers, finding.sentence)
-    if finding.status == "suggested":
-        return _entry("suggested", finding.id, numbers, finding.objection)
-    if finding.id not in analysis.without:
-        return _entry("mistakes_first", finding.id, numbers, finding.sentence)
-    if finding.status == "ambiguous":
-        return _entry("class", finding.id, numbers, f"these data cannot distinguish {', '.join(finding.alternatives)}")
-    return _entry("established", finding.id, numbers, "it passed every rule")
+        rule, sentence = finding.rule or "search", finding.sentence
+    elif finding.status == "absorbed":
+        rule, sentence = "absorbed_by_values", finding.sentence
+    elif finding.status == "suggested":
+        rule, sentence = "suggested", finding.objection
+    elif finding.id not in analysis.without:
+        rule, sentence = "mistakes_first", finding.sentence
+    elif finding.status == "ambiguous":
+        rule, sentence = "class", f"these data cannot distinguish {', '.join(finding.alternatives)}"
+    else:
+        rule, sentence = "established", "it passed every rule"
+    return _entry(rule, finding.id, numbers, sentence)
 
 
 def _entry(rule: str, on: str, numbers: dict | None = None, sentence: str = "") -> dict:
     """One line of the ledger."""
     known = {name: value for name, value in (numbers or {}).items() if math.isfinite(value)}
     return {"rule": rule, "on": on, "numbers": rounded(known), "sentence": str(sentence)}
-
-
-def text_of(entries: list[dict]) -> str:
-    """The ledger as it is written."""
-    return json.dumps(entries, indent=1, allow_nan=False) + "\n"
 
 
 @dataclass(frozen=True, repr=False)

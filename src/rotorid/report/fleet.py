@@ -19,7 +19,6 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
@@ -43,7 +42,7 @@ from rotorid.mismatch.changes.words import difference_words, in_unit_of_words, q
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings.templates import read
 from rotorid.report.deliver import FILES, OTHERS, deliver
-from rotorid.report.page import drawing, filled
+from rotorid.report.page import drawing, drawn, filled
 from rotorid.steps import one_thread
 from rotorid.vehicle.control import swings
 
@@ -99,7 +98,7 @@ def _load() -> None:
     """
     made_up = swings(read("thesis"), "first", 3.0, 2, 1)
     with tempfile.TemporaryDirectory() as folder:
-        deliver(made_up, *(Path(folder) / name for name in FILES[:3]))
+        deliver(made_up, Path(folder))
 
 
 def _judge_apart(folder: Path, known: Path, out: Path) -> None:
@@ -141,7 +140,7 @@ def _judge_one(folder: Path, target: Path) -> None:
         _write_failure(target, str(error), fault=False)
         return
     try:
-        deliver(recordings, *(target / name for name in FILES[:3]))
+        deliver(recordings, target)
     except InputError as error:
         _write_failure(target, str(error), fault=False)
     except OSError as error:
@@ -229,8 +228,7 @@ def by_effect(effects: pd.DataFrame, sets: pd.DataFrame) -> pd.DataFrame:
         surely = own[own["status"] == "established"]
         rows.append((name, *counts, surely["vehicle"].nunique(), surely["share"].median()))
     table = pd.DataFrame(rows, columns=["effect", *_SHOWN, "vehicles", "share"])
-    judged = int((sets["verdict"] != "failed").sum())
-    table.insert(1, "of_sets", judged)
+    table.insert(1, "of_sets", int((sets["verdict"] != "failed").sum()))
     return table.sort_values([*_SHOWN, "effect"], ascending=[False] * 3 + [True], ignore_index=True)
 
 
@@ -276,23 +274,12 @@ def vehicle_page(vehicle: str, numbers: pd.DataFrame, events: pd.DataFrame) -> s
     """The page of one vehicle with its figure, from its rows of the tables of `history`."""
     from rotorid.report.plots.mismatch import draw_vehicle
 
-    with TemporaryDirectory() as folder:
-        figure = Path(folder) / "figure.svg"
-        draw_vehicle(numbers, events, figure)
-        return make_vehicle_page(vehicle, numbers, events, figure)
-
-
-def make_vehicle_page(vehicle: str, numbers: pd.DataFrame, events: pd.DataFrame, figure: Path) -> str:
-    """The page of one vehicle from its rows of the tables of `rotorid.report.fleet`, and their figure."""
-    sets = list(dict.fromkeys(numbers["set"]))
     return filled(
         "vehicle.html",
         vehicle=vehicle,
-        sets=len(sets),
-        first=sets[0],
-        last=sets[-1],
+        sets=list(dict.fromkeys(numbers["set"])),
         events=events.to_dict("records"),
-        figure=drawing(figure),
+        figure=drawn(draw_vehicle, numbers, events),
     )
 
 
@@ -377,7 +364,10 @@ def history(
             left_out(f"{vehicle} is left out: {error}")
             continue
         numbers += _numbers_of(vehicle, shown, good)
-        events += [row for point in change_points(shown, good) for row in _rows_of(vehicle, *point)]
+        for name, lasts, differing in change_points(shown, good):
+            head = {"vehicle": vehicle, "set": name, "day": day_of(name), "lasts": lasts}
+            on = f"{vehicle}, from {name} on: "
+            events += [head | {"id": d.quantity.key, "sentence": on + difference_words(d)} for d in differing]
     return pd.DataFrame(numbers, columns=_NUMBERS), pd.DataFrame(events, columns=EVENTS)
 
 
@@ -417,24 +407,23 @@ def change_points(shown: _Shown, good: int) -> list[tuple[str, int, tuple[Differ
     if not places:
         return []
     numbers = measured(list(shown.values()))
-    best: tuple[float, float, int, tuple[Difference, ...]] | None = None
-    for k in places:
-        found = differences_at(k, numbers, names, usual_scatter())
-        stated = tuple(d for d in found if d.false_alarms * len(places) <= FALSE_ALARMS)
-        if stated and (best is None or _rarity(stated[0]) < best[:2]):
-            best = (*_rarity(stated[0]), k, stated)
-    if best is None:
+    differing = {k: differences_at(k, numbers, names, usual_scatter()) for k in places}
+    stated_at = {k: tuple(d for d in found if d.false_alarms * len(places) <= FALSE_ALARMS)
+                 for k, found in differing.items()}  # fmt: skip
+    if not any(stated_at.values()):
         return []
-    *_, k, stated = best
+
+    def rarity(k: int) -> tuple[float, float]:
+        """The rarest first; of those that are equally rare, by their size."""
+        rarest = stated_at[k][0]
+        return rarest.false_alarms, -abs(rarest.value) / rarest.sd
+
+    k = min(filter(stated_at.get, places), key=rarity)
+    stated = stated_at[k]
     before, after = ({n: shown[n] for n in part} for part in (names[:k], names[k:]))
     earlier, later = change_points(before, good), change_points(after, good)
     first = list(after).index(later[0][0]) if later else len(after)
     return [*earlier, (names[k], first, stated), *later]
-
-
-def _rarity(d: Difference) -> tuple[float, float]:
-    """How rare a difference is, the rarest first; of those that are equally rare, by their size."""
-    return d.false_alarms, -abs(d.value) / d.sd
 
 
 def _numbers_of(vehicle: str, shown: _Shown, good: int) -> list[dict]:
@@ -453,10 +442,3 @@ def _numbers_of(vehicle: str, shown: _Shown, good: int) -> list[dict]:
             row |= {"name": d.quantity.key, "quantity": quantity_words(d), "unit": unit_of(d)}
             out.append(row | {"change": change, "low_95": low, "high_95": high, "limit": limit})
     return out
-
-
-def _rows_of(vehicle: str, name: str, lasts: int, differing: Sequence[Difference]) -> list[dict]:
-    """Rows of what differs from a set on, the rarest first."""
-    head = {"vehicle": vehicle, "set": name, "day": day_of(name), "lasts": lasts}
-    on = f"{vehicle}, from {name} on: "
-    return [head | {"id": d.quantity.key, "sentence": on + difference_words(d)} for d in differing]

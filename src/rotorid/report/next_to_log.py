@@ -15,16 +15,17 @@ from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
+import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.mismatch.decide.findings import Analysis
-from rotorid.mismatch.decide.sizes import WINDOW_S, segments_of
+from rotorid.mismatch.decide.sizes import WINDOW_S
 from rotorid.mismatch.deliver.flown import UNITS, Model, driven_by, model_of
-from rotorid.mismatch.tell.forward import delivered_model
+from rotorid.mismatch.tell.forward import delivered_model, simulated_segments
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
 from rotorid.vehicle.exports import autopilots
-from rotorid.vehicle.exports.flown import multirotor_of, passive_forces, read_by
+from rotorid.vehicle.exports.flown import passive_forces, read_by, through_rotorpy
 from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, expressed, parts_of
 from rotorid.vehicle.windows import Inputs, States, plan_windows, simulate_windows
 
@@ -63,6 +64,15 @@ class NextToLog:
         """Root mean square over all samples but the restarts."""
         return float(np.sqrt(np.mean(self.errors[model][channel][:, 1:] ** 2)))
 
+    def table(self) -> pd.DataFrame:
+        """A row a model and channel: its error, unit, and of how many windows."""
+        rows = [
+            (model, channel, self.error(model, channel), UNITS[channel], len(self.windows))
+            for model, channels in self.errors.items()
+            for channel in channels
+        ]
+        return pd.DataFrame(rows, columns=["model", "channel", "rms_error", "unit", "windows"])
+
     def sentences(self) -> list[str]:
         """The numbers, a line a channel."""
         out = [f"flown in {self.how} on the log's rotor speeds, {len(self.windows)} windows of half a second:"]
@@ -89,9 +99,7 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
     if package and find_spec(package) is None:
         raise InputError(f"{package} is not installed: the exported vehicle was not flown next to the log")
     found = []
-    usable = [
-        s for s in segments_of(analysis) if s.motion.rotor_speed is not None and s.motion.angular_velocity is not None
-    ]
+    usable = simulated_segments(analysis)
     for segment, inputs, states in zip(usable, *driven_by(usable, improved), strict=True):
         if states.quaternion is None:
             continue
@@ -119,12 +127,11 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
 
 def _ours(model: Model, windows: Sequence[LogWindow]) -> list[States]:
     """The windows flown by our own simulator: the wrench of the model's forms at each instant."""
-    vehicle = model.vehicle
     out = []
     for window in windows:
         inputs = Inputs(window.speed, np.gradient(window.speed, window.time_s, axis=0), wind=window.wind)
         every = np.arange(len(window.time_s))[None]
-        made = simulate_windows(vehicle, model.forms, window.time_s, inputs, window.recorded, sample=every)
+        made = simulate_windows(model.vehicle, model.forms, window.time_s, inputs, window.recorded, sample=every)
         out.append(States(**{n: None if v is None else v[0] for n, v in vars(made.predicted).items()}))
     return out
 
@@ -235,7 +242,7 @@ def _shares(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow], 
 def _in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """RotorPy's Multirotor with the exported parameters and their companion; the speeds are set at every sample and
     held over a step."""
-    out, multirotor = [], multirotor_of(exported)
+    out = []
     for window in windows:
         start, mid = window.recorded, 0.5 * (window.speed[:-1] + window.speed[1:])
         state = {
@@ -243,16 +250,7 @@ def _in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindo
             "q": (start.quaternion[0] * [1, *FLU])[[1, 2, 3, 0]], "w": start.angular_velocity[0] * FLU,
             "rotor_speeds": mid[0],
         }  # fmt: skip
-        with read_by("RotorPy"):
-            flyer = multirotor(exported.parameters, state, control_abstraction="cmd_motor_speeds")
-        flyer.tau_m = 1e6
-        kept = [state]
-        for k, speed in enumerate(mid):
-            state = flyer.step(
-                {**state, "rotor_speeds": speed}, {"cmd_motor_speeds": speed}, window.time_s[k + 1] - window.time_s[k]
-            )
-            kept.append(state)
-        series = {key: np.array([np.asarray(s[key]) for s in kept]) for key in ("x", "v", "q", "w")}
+        series = through_rotorpy(exported, state, mid, np.diff(window.time_s), at_once=True)
         out.append(_from_flu(series["x"], series["v"], series["q"][:, [3, 0, 1, 2]], series["w"], start))
     return out
 
@@ -302,13 +300,9 @@ def _from_flu(position, velocity, quaternion, rates, start: States) -> States:
     )
 
 
-def as_expressed(to: str) -> Callable[[Vehicle, Exported, Sequence[LogWindow]], list[States]]:
+def as_expressed(to: str, vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """Our simulator with the effects that a form expresses."""
-
-    def fly(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
-        return _ours(model_of(expressed(vehicle, to)), windows)
-
-    return fly
+    return _ours(model_of(expressed(vehicle, to)), windows)
 
 
 FLYERS: dict[str, tuple[str, str, Callable[[Vehicle, Exported, Sequence[LogWindow]], list[States]]]] = {
@@ -316,8 +310,12 @@ FLYERS: dict[str, tuple[str, str, Callable[[Vehicle, Exported, Sequence[LogWindo
     "ardupilot-json": ("ArduPilot's simulated frame by its published equations", "", in_ardupilot),
     "rotorpy": ("RotorPy", "rotorpy", _in_rotorpy),
     "mjcf": ("MuJoCo", "mujoco", _in_mujoco),
-    "sdf": ("our simulator with what the SDF file expresses", "", as_expressed("sdf")),
-    "gym-pybullet-drones": ("our simulator with what the URDF expresses", "", as_expressed("gym-pybullet-drones")),
-    "crazyflow": ("our simulator with what crazyflow's section expresses", "", as_expressed("crazyflow")),
+    "sdf": ("our simulator with what the SDF file expresses", "", partial(as_expressed, "sdf")),
+    "gym-pybullet-drones": (
+        "our simulator with what the URDF expresses",
+        "",
+        partial(as_expressed, "gym-pybullet-drones"),
+    ),
+    "crazyflow": ("our simulator with what crazyflow's section expresses", "", partial(as_expressed, "crazyflow")),
 }
 """By form what flies it, the package that must be there, and the flight."""

@@ -547,13 +547,9 @@ def fly_windows(
     start,
     time_s,
     speed,
-    speed_between,
     acceleration,
-    acceleration_between,
     wind,
-    wind_between,
     push,
-    push_between,
     height_offset,
     addresses,
     explicit,
@@ -566,14 +562,12 @@ def fly_windows(
 ):
     """States (w, m, 3, 7 or 13) of w windows from their `start`, driven by recorded inputs.
 
-    Inputs are (w, m, ...) at the samples `time_s` (w, m), and `_between` (w, m - 1, ...) half way between them; of
-    `acceleration`, `wind` and `push` an axis of windows of length 0 stands for none. `height_offset` (w,). Windows fly
-    in blocks of as many as there are records.
+    Inputs are (w, 2 m - 1, ...): at the samples `time_s` (w, m), and half way between them. `height_offset` (w,).
+    Windows fly in blocks of as many as there are records.
     """
     size = start.shape[1]
     k = speed.shape[2]
     most = instant.shape[0]
-    still, none = np.zeros((1, 1, 3)), np.zeros((1, 1, 6))
     v = body[0]
     effects = addresses.shape[0] > 0
     for c in range(most):
@@ -589,30 +583,17 @@ def fly_windows(
         for j in range(time_s.shape[1] - 1):
             for stage in range(4):
                 share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-                between = stage == 1 or stage == 2
-                at = j + 1 if stage == 3 else j
+                at = 2 * j + (stage + 1) // 2
                 for c in range(count):
                     n, m, x = first + c, instant[c], scratch[c]
                     step_s = time_s[n, j + 1] - time_s[n, j]
                     m.time_s = time_s[n, j] + share * step_s
                     _try(x, size, stage, step_s)
                     for i in range(k):
-                        m.rotor_speed[i] = speed_between[n, j, i] if between else speed[n, at, i]
-                        if acceleration.shape[0] > 0:
-                            present = acceleration_between[n, j, i] if between else acceleration[n, at, i]
-                            m.rotor_acceleration[i] = present
-                    if wind.shape[0] == 0:
-                        _enter(m, v, x, size, effects, still, 0, 0, height_offset[n])
-                    elif between:
-                        _enter(m, v, x, size, effects, wind_between, n, j, height_offset[n])
-                    else:
-                        _enter(m, v, x, size, effects, wind, n, at, height_offset[n])
-                    if push.shape[0] == 0:
-                        _base(m, v, x, none, 0, 0)
-                    elif between:
-                        _base(m, v, x, push_between, n, j)
-                    else:
-                        _base(m, v, x, push, n, at)
+                        m.rotor_speed[i] = speed[n, at, i]
+                        m.rotor_acceleration[i] = acceleration[n, at, i]
+                    _enter(m, v, x, size, effects, wind, n, at, height_offset[n])
+                    _base(m, v, x, push, n, at)
                 _accelerate(count, first, 0, instant, body, added, scratch, addresses, explicit, offsets, values, 0)
                 for c in range(count):
                     _rates_of_change(instant[c], v, scratch[c], size, stage)

@@ -6,7 +6,7 @@ flies, and turns his gains down where the rotors answer more strongly or later t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,7 @@ from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.fast import AttitudeLoop
 from rotorid.vehicle.improved import (
     active_speed_forms,
+    all_forms,
     command_path,
     flyable,
     hover,
@@ -54,11 +55,26 @@ START_HEIGHT_M = 100.0
 def remarks(vehicle: Vehicle) -> tuple[str, ...]:
     """What `swings` flies otherwise than the file says, a sentence each; InputError for what does not fly."""
     flown, said = flyable(vehicle)
+    said += tuple(_beyond_their_bounds(flown))
     found = hover(flown, command_path(flown), START_HEIGHT_M)
     if found.supported < 1:
         share = 100 * max(found.supported, 0.0)
         said += (f"The vehicle sinks: all that its rotors can do carries {share:.0f} % of what hover needs.",)
     return said
+
+
+def _beyond_their_bounds(vehicle: Vehicle) -> Iterator[str]:
+    """A sentence for each parameter of an effect that lies beyond the bounds of its entry in the catalogue."""
+    digits = 1e-5  # Share of a bound by which a value that lies on it may pass it as a file states it.
+    for entry, (form, values) in zip(vehicle.effects, all_forms(vehicle), strict=True):
+        for p, value in zip(form.parameters, values, strict=True):
+            if p.low - digits * abs(p.low) <= value <= p.high + digits * abs(p.high):
+                continue
+            bound = f"at least {p.low:.3g}" if value < p.low else f"at most {p.high:.3g}"
+            yield (
+                f"The {p.symbol} of {entry['id']} ({form.name}) is {value:.4g}, beyond what its entry of the catalogue "
+                f"takes for possible ({bound}): look for a wrong unit or decimal point; it is flown all the same."
+            )
 
 
 def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int, every: int = 2) -> RecordingSet:

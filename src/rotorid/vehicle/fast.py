@@ -22,26 +22,16 @@ _LEAST_PER_THREAD = 16
 """Vehicles below which a further thread is not worth its start."""
 _BLOCK = 8
 """Vehicles that fly together; their records fill half of a processor's first cache."""
-_ALWAYS_KNOWN = frozenset(
-    {
-        "rotor_speed",
-        "angular_velocity",
-        "angular_acceleration",
-        "specific_force",
-        # A simulated vehicle carries sensors that read the truth.
-        "accelerometer",
-        "gyroscope",
-    }
-)
+_ALWAYS_KNOWN = {"rotor_speed", "angular_velocity", "angular_acceleration", "specific_force"}
+_ALWAYS_KNOWN |= {"accelerometer", "gyroscope"}  # A simulated vehicle carries sensors that read the truth.
 
 
 def check_effects(effects: Sequence[tuple[Form, Sequence[float]]], known: set[str]) -> None:
     """InputError where a form needs a field of `Motion` that is neither in `known` nor always known."""
     for form, _ in effects:
-        for name in form.requires:
-            if name not in known and name not in _ALWAYS_KNOWN:
-                reason = LACK.get(name, f"no {name}")
-                raise InputError(f"effect form {form.name!r} cannot be simulated: {reason}")
+        if lacking := [name for name in form.requires if name not in known | _ALWAYS_KNOWN]:
+            reason = LACK.get(lacking[0], f"no {lacking[0]}")
+            raise InputError(f"effect form {form.name!r} cannot be simulated: {reason}")
 
 
 _ACCELERATIONS = frozenset({"specific_force", "angular_acceleration", "accelerometer"})
@@ -192,18 +182,8 @@ def commanding(loop: AttitudeLoop, size: int, step_s: float) -> Callable[[int, n
     scratch = np.zeros(size, compiled.scratch_record(room_for(k)))
 
     def command(j: int, states: np.ndarray, attitude_errors: np.ndarray) -> np.ndarray:
-        errors = np.ascontiguousarray(attitude_errors)[:, None]
-        compiled.command(
-            scratch,
-            np.ascontiguousarray(states),
-            errors,
-            j,
-            step_s,
-            given["loops"],
-            k,
-            given["references"],
-            given["more"],
-        )
+        read = np.ascontiguousarray(states), np.ascontiguousarray(attitude_errors)[:, None]
+        compiled.command(scratch, *read, j, step_s, given["loops"], k, given["references"], given["more"])
         return scratch["command"][:, :k].copy()
 
     return command
@@ -372,20 +352,9 @@ def fly_windows(
     if not len(start):
         return out
 
-    def part(first: int, last: int) -> None:
-        mine = (a[first:last] for a in (start, time_s, *driven))
-        compiled.fly_windows(
-            body,
-            *mine,
-            kernels.addresses,
-            kernels.explicit,
-            kernels.offsets,
-            kernels.values,
-            *_block(last - first, int(body["rotors"][0])).values(),
-            out[first:last],
-        )
-
-    _spread(part, len(start), 1)
+    called = kernels.addresses, kernels.explicit, kernels.offsets, kernels.values
+    block = _block(len(start), int(body["rotors"][0]))
+    compiled.fly_windows(body, start, time_s, *driven, *called, *block.values(), out)
     return out
 
 

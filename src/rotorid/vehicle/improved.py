@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import brentq, least_squares
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import CURVE, DELAY, LIMIT, Form, Motion, SetForm, SpeedForm, SpeedPath
+from rotorid.effects.contract import CURVE, DELAY, LIMIT, Form, SetForm, SpeedForm, SpeedPath
 from rotorid.effects.instant import body_of
 from rotorid.errors import InputError
 from rotorid.recordings.run import RecordingSet
@@ -26,7 +26,17 @@ from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle import fast
 from rotorid.vehicle.derivatives import derivative_form
 from rotorid.vehicle.mixer import allocation_matrix, hover_speed_rad_s
-from rotorid.vehicle.simulator import CommandPath, Commands, Controller, Motors, Trace, WhiteNoise, recording, simulate
+from rotorid.vehicle.simulator import (
+    CommandPath,
+    Commands,
+    Controller,
+    Motors,
+    Trace,
+    WhiteNoise,
+    at_rest,
+    recording,
+    simulate,
+)
 
 _LARGEST_SHARE = 10.0
 """Thrust, over the weight, up to which is asked where the file states no limits of the rotor speed."""
@@ -43,10 +53,6 @@ LAGS_OF_SPEED = frozenset({"one constant", "up and down"})
 
 ActiveForm = tuple[Form, np.ndarray]
 """A form of an effect and the values of its parameters, in order."""
-_ActiveSpeedForm = tuple[SpeedForm, np.ndarray]
-"""The same for a form that acts between command and rotor speed."""
-_ActiveSetForm = tuple[SetForm, np.ndarray]
-"""The same for a form that spoils the recorded set."""
 
 
 def active_forms(vehicle: Vehicle) -> list[ActiveForm]:
@@ -55,22 +61,17 @@ def active_forms(vehicle: Vehicle) -> list[ActiveForm]:
 
     An entry is `{id, form, parameters: {symbol: value}}`; `form` may be left out where the effect has one form.
     InputError names the entry and what was expected. Forms between command and rotor speed and forms that spoil
-    the recorded set are passed over here: `active_speed_forms` and `active_set_forms` have them.
+    the recorded set are passed over here: `all_forms` has them.
     """
     found = [found for found in all_forms(vehicle) if isinstance(found[0], Form)]
     derivatives = derivative_form(vehicle)
     return found if derivatives is None else [*found, derivatives]
 
 
-def active_speed_forms(vehicle: Vehicle) -> list[_ActiveSpeedForm]:
+def active_speed_forms(vehicle: Vehicle) -> list[tuple[SpeedForm, np.ndarray]]:
     """Forms of `vehicle.effects` that act between command and rotor speed, in the order of the path."""
     found = [found for found in all_forms(vehicle) if isinstance(found[0], SpeedForm)]
     return sorted(found, key=lambda pair: pair[0].stage)
-
-
-def active_set_forms(vehicle: Vehicle) -> list[_ActiveSetForm]:
-    """Forms of `vehicle.effects` that spoil the recorded set, in the order of the file."""
-    return [found for found in all_forms(vehicle) if isinstance(found[0], SetForm)]
 
 
 def speeds_of_commands(
@@ -96,15 +97,13 @@ def speeds_of_commands(
     return speed
 
 
-def all_forms(vehicle: Vehicle) -> list[ActiveForm | _ActiveSpeedForm | _ActiveSetForm]:
+def all_forms(vehicle: Vehicle) -> list[tuple[Form | SpeedForm | SetForm, np.ndarray]]:
     """Every form of `vehicle.effects` with its values, in the order of the file."""
     return [_active(entry, number, vehicle) for number, entry in enumerate(vehicle.effects, 1)]
 
 
-def _active(entry: dict, number: int, vehicle: Vehicle) -> ActiveForm | _ActiveSpeedForm | _ActiveSetForm:
-    where = f"vehicle {vehicle.name}: effects entry {number}"
-    name = entry.get("id")
-    effects = catalogue()
+def _active(entry: dict, number: int, vehicle: Vehicle) -> tuple[Form | SpeedForm | SetForm, np.ndarray]:
+    where, name, effects = f"vehicle {vehicle.name}: effects entry {number}", entry.get("id"), catalogue()
     if name not in effects:
         raise InputError(f"{where} has id {name!r}, expected one of {', '.join(effects)}")
     effect = effects[name]
@@ -135,10 +134,9 @@ def command_path(
     `voltage_v` (m,) is the battery's voltage at each step; without any it is the full one throughout.
     InputError where a form refers to the speed of the full command and the file states no limits.
     """
-    forms = active_speed_forms(vehicle)
+    forms, limits = active_speed_forms(vehicle), vehicle.rotor_speed_limits_rad_s
     if not forms:
         return None
-    limits = vehicle.rotor_speed_limits_rad_s
     unscaled = [form.name for form, _ in forms if form.stage in (CURVE, LIMIT)]
     if unscaled and limits is None:
         raise InputError(
@@ -220,8 +218,8 @@ def record_as_stated(
     """
     run = recording(trace, vehicle, name, noise, rng, index, active_forms(vehicle), every)
     recordings = RecordingSet(vehicle.name, vehicle.model_copy(update={"effects": (), "derivatives": ()}), (run,))
-    for form, values in active_set_forms(vehicle):
-        recordings = form.apply(recordings, values)
+    for form, values in all_forms(vehicle):
+        recordings = form.apply(recordings, values) if isinstance(form, SetForm) else recordings
     return recordings
 
 
@@ -233,20 +231,20 @@ def flyable(vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
     if vehicle.kind != "flight":
         raise InputError(f"{vehicle.name}: a {vehicle.kind} does not fly, so that there is no flight to simulate")
     forms = all_forms(vehicle)
-    between = [(form, values) for form, values in forms if isinstance(form, SpeedForm)]
+    between = [form for form, _ in forms if isinstance(form, SpeedForm)]
     changes: dict = {}
     said: list[str] = []
-    delays = [i for i, (form, _) in enumerate(forms) if isinstance(form, SpeedForm) and form.stage == DELAY]
-    early = [i for i in delays if forms[i][1][0] < 0]
+    delays = [(i, v[0]) for i, (form, v) in enumerate(forms) if isinstance(form, SpeedForm) and form.stage == DELAY]
+    early = [i for i, delay_s in delays if delay_s < 0]
     if early:
         changes["effects"] = tuple(e for i, e in enumerate(vehicle.effects) if i not in early)
         said.append(
             f"The delay of the command of {forms[early[0]][1][0]:.3g} s is left out: "
             "rotors do not follow a command before it is given."
         )
-    if any("voltage" in form.requires for form, _ in between):
+    if any("voltage" in form.requires for form in between):
         said.append("The battery stays at its full voltage.")
-    if vehicle.rotor_speed_limits_rad_s is None and any(form.stage in (CURVE, LIMIT) for form, _ in between):
+    if vehicle.rotor_speed_limits_rad_s is None and any(form.stage in (CURVE, LIMIT) for form in between):
         full = _FULL_OVER_HOVER * hover_speed_rad_s(vehicle)
         changes["rotor_speed_limits_rad_s"] = (0.0, full)
         said.append(
@@ -264,7 +262,7 @@ class _Hover:
     """What to ask for."""
 
     thrust_n: float
-    moments_n_m: tuple[float, float, float]
+    moments_n_m: tuple[float, ...]
     """About roll, pitch and yaw."""
     gain: float
     """Force, N, that a further newton of thrust makes."""
@@ -329,18 +327,7 @@ def wrench_of_command(vehicle: Vehicle, path: CommandPath | None, command: np.nd
     up = -vehicle.mass_kg * specific_force[2]
     moments = turning @ vehicle.inertia_kg_m2.matrix().T
     time_s = np.linspace(0.0, _HUNG_S, _HUNG_SAMPLES)
-    hanging = Motion(
-        rotor_speed=np.repeat(speed, len(time_s), axis=0),
-        angular_velocity=np.zeros((len(time_s), 3)),
-        angular_acceleration=np.zeros((len(time_s), 3)),
-        specific_force=np.repeat([[0.0, 0.0, -vehicle.gravity_m_s2]], len(time_s), axis=0),
-        time_s=time_s,
-        rotation=np.repeat(np.eye(3)[None], len(time_s), axis=0),
-        velocity=np.zeros((len(time_s), 3)),
-        position=np.zeros((len(time_s), 3)),
-        rotor_acceleration=np.zeros((len(time_s), vehicle.rotor_count)),
-        height=np.full(len(time_s), height_m),
-    )
+    hanging = at_rest(vehicle, time_s, np.repeat(speed, len(time_s), axis=0), height_m)
     for form, values in every:
         if form.memory and (added := form.contribution(hanging, vehicle, values)).force is not None:
             up -= added.force[:, 2].mean()

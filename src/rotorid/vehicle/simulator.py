@@ -139,19 +139,15 @@ class CommandPath:
     full_voltage: float = 1.0
     """Voltage at which commands are right, V."""
 
-    def start(self, step_s: float, rotor_speed: np.ndarray | None = None) -> _Stepper:
-        """A flight's own path from its first instant; a lag starts at `rotor_speed` (n, k), rad/s, if that is given."""
-        return _Stepper(self, step_s, rotor_speed)
-
     def steady(self, command: np.ndarray) -> np.ndarray:
         """Rotor speeds (..., k), rad/s, that commands (..., k) lead to when they are held, at the first voltage."""
         speed = np.asarray(command, float)
         for form, values in self.forms:
             if form.stage < DELAY:
-                speed = self._static(form, values, speed, 0, 0.0)
+                speed = self.static(form, values, speed, 0, 0.0)
         return speed
 
-    def _static(self, form: SpeedForm, values: np.ndarray, speed: np.ndarray, step: int, time_s: float) -> np.ndarray:
+    def static(self, form: SpeedForm, values: np.ndarray, speed: np.ndarray, step: int, time_s: float) -> np.ndarray:
         """What a form without memory makes of speeds (..., k) that hold from the start of the run until a time."""
         voltage = np.full(2, self.full_voltage if self.voltage is None else self.voltage[step])
         held = np.stack([speed.ravel(), speed.ravel()])
@@ -159,19 +155,15 @@ class CommandPath:
         return form.apply(path, values)[-1].reshape(speed.shape)
 
 
-@dataclass
 class _Stepper:
     """Where a flight is on its path: call `speed` once for every step, in order."""
 
-    path: CommandPath
-    step_s: float
-    rotor_speed: np.ndarray | None = None
-    """Speed at which a lag starts, (n, k), rad/s."""
-    step: int = 0
-    _past: dict[int, deque] = field(default_factory=dict)
-    """By place in the path, what a delay was asked before, the latest first."""
-    _lagging: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
-    """By place in the path, speed of a lag and what it was asked, at the step before."""
+    def __init__(self, path: CommandPath, step_s: float, rotor_speed: np.ndarray | None) -> None:
+        """A lag starts at `rotor_speed` (n, k), rad/s, if that is given."""
+        self.path, self.step_s, self.rotor_speed, self.step = path, step_s, rotor_speed, 0
+        # By place in the path what a delay was asked before, the latest first; speed of a lag and what it was asked.
+        self._past: dict[int, deque] = {}
+        self._lagging: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def speed(self, command: np.ndarray) -> np.ndarray:
         """Rotor speeds (n, k), rad/s, at this step under commands (n, k) that hold until the next."""
@@ -182,7 +174,7 @@ class _Stepper:
             elif form.stage == LAG:
                 speed = self._lagged(place, form, values, speed)
             else:
-                speed = self.path._static(form, values, speed, self.step, self.step * self.step_s)
+                speed = self.path.static(form, values, speed, self.step, self.step * self.step_s)
         self.step += 1
         return speed
 
@@ -277,13 +269,6 @@ def simulate(
     return trace
 
 
-def _known_commands(controller: Controller, time_s: np.ndarray) -> np.ndarray | fast.AttitudeLoop | None:
-    """Commands (m, k) of every instant, or the plan of an attitude loop; None where only a call gives them."""
-    if isinstance(controller, Commands):
-        return controller.rotor_speed[controller.index(time_s)]
-    return None if hasattr(controller, "rotor_command") else controller.attitude_loop(time_s)
-
-
 def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) -> np.ndarray:
     """Force and moment of the disturbance, (steps + 1, n, 6), N and N m, body axes, held over each step."""
     out = np.zeros((steps + 1, n, 6))
@@ -303,7 +288,7 @@ class _Flight:
 
     def __init__(self, vehicle, effects, motors: Motors, start: Start, step_s, wind_m_s, path):
         self.vehicle, self.motors, self.step_s = vehicle, motors, step_s
-        self.path = None if path is None else path.start(step_s, start.rotor_speed_rad_s)
+        self.path = None if path is None else _Stepper(path, step_s, start.rotor_speed_rad_s)
         self.start, self.size = start, start.size
         up, down = motors.time_up_s, motors.time_down_s
         self._fly = partial(
@@ -317,15 +302,16 @@ class _Flight:
 
     def fly(self, controller: Controller, pushes: np.ndarray, attitude_errors: np.ndarray) -> Trace:
         """The flight under a controller, a disturbance (steps + 1, n, 6) and errors of attitude (steps + 1, n, 3)."""
-        known = _known_commands(controller, self.step_s * np.arange(len(pushes)))
-        if isinstance(known, fast.AttitudeLoop):
+        time_s, known = self.step_s * np.arange(len(pushes)), None
+        if not hasattr(controller, "rotor_command"):  # an attitude loop lays itself out
+            known = controller.attitude_loop(time_s)
             command = fast.commanding(known, self.size, self.step_s)
         else:
+            if isinstance(controller, Commands):
+                known = controller.rotor_speed[controller.index(time_s)]
 
-            def command(j: int, states: np.ndarray, attitude_errors: np.ndarray) -> np.ndarray:
-                return controller.rotor_command(
-                    j * self.step_s, euler_from_quaternion(states[:, 3:7]) + attitude_errors
-                )
+            def command(j: int, states: np.ndarray, errors: np.ndarray) -> np.ndarray:
+                return controller.rotor_command(time_s[j], euler_from_quaternion(states[:, 3:7]) + errors)
 
         if known is None or self.path is not None:
             trace = self._by_steps(controller, command, pushes, attitude_errors)
@@ -402,6 +388,23 @@ class _Flight:
             accelerations[i], state = flown.accelerations[:, 0], flown.states[:, 1]
         series = (np.moveaxis(values, 0, 1) for values in (states, accelerations, commands))
         return Trace(self.step_s * np.arange(steps + 1), *series)
+
+
+def at_rest(vehicle: Vehicle, time_s: np.ndarray, rotor_speed: np.ndarray, height_m: float) -> Motion:
+    """A level vehicle that stands in the air at instants (n,), its rotors turning at (n, k), rad/s."""
+    n, still = len(time_s), np.zeros((len(time_s), 3))
+    return Motion(
+        time_s=time_s,
+        rotor_speed=rotor_speed,
+        rotor_acceleration=np.zeros((n, vehicle.rotor_count)),
+        angular_velocity=still,
+        angular_acceleration=still,
+        specific_force=np.tile([0.0, 0.0, -vehicle.gravity_m_s2], (n, 1)),
+        rotation=np.tile(np.eye(3), (n, 1, 1)),
+        velocity=still,
+        position=still,
+        height=np.full(n, height_m),
+    )
 
 
 def motion_of(trace: Trace, index: int, vehicle: Vehicle, wind_m_s=None, voltage_v=None) -> Motion:

@@ -123,9 +123,8 @@ def simulate_windows(
     known = {"rotation"} if attitude else set()
     known |= {"velocity"} if translation else set()
     known |= {"height"} if height_offset is not None else set()
-    for form, _ in effects:
-        if form.memory:
-            raise InputError(f"effect form {form.name!r} has a memory of its own: give its wrench in inputs.force")
+    if memory := [form.name for form, _ in effects if form.memory]:
+        raise InputError(f"effect form {memory[0]!r} has a memory of its own: give its wrench in inputs.force")
     fast.check_effects(effects, known | given.keys())
     start = [recorded.angular_velocity[first]]
     if attitude:
@@ -133,12 +132,10 @@ def simulate_windows(
     if translation:
         start.append(recorded.velocity[first])
         start.append(np.zeros((w, 3)) if recorded.position is None else recorded.position[first])
-    driven = []
-    for name, axes in (("rotor_speed", k), ("rotor_acceleration", k), ("wind", 3), ("push", 6)):
-        if name in given:
-            driven += [given[name][sample], _halfway(given[name], time_s, sample)]
-        else:
-            driven += [np.zeros((0, m, axes))] * 2
+    driven = [
+        _with_halves(given[name], time_s, sample) if name in given else np.zeros((w, 2 * m - 1, axes))
+        for name, axes in (("rotor_speed", k), ("rotor_acceleration", k), ("wind", 3), ("push", 6))
+    ]
     out = fast.fly_windows(
         body_of(vehicle),
         fast.kernels_of(effects, vehicle),
@@ -197,17 +194,19 @@ def usable(inputs: Inputs, recorded: States) -> np.ndarray:
     return good
 
 
-def _halfway(values: np.ndarray, time_s: np.ndarray, sample: np.ndarray) -> np.ndarray:
-    """Values half way between successive window samples, (w, m - 1, ...), of values (n, ...).
+def _with_halves(values: np.ndarray, time_s: np.ndarray, sample: np.ndarray) -> np.ndarray:
+    """Values at window samples and half way between them, (w, 2 m - 1, ...), of values (n, ...).
 
-    The recorded sample where one lies there, else the cubic through the four nearest samples (a straight line
-    would lose a share (2π f dt)²/12 of a signal at frequency f); linear at the ends and where samples are
-    uneven.
+    Half way the recorded sample where one lies there, else the cubic through the four nearest samples (a straight line
+    would lose a share (2π f dt)²/12 of a signal at frequency f); linear at the ends and where samples are uneven.
     """
+    out = np.empty((len(sample), 2 * sample.shape[1] - 1, *values.shape[1:]))
+    out[:, ::2] = values[sample]
     first, last = sample[:, :-1], sample[:, 1:]
     stride = int(last.flat[0] - first.flat[0]) if sample.size > 1 else 1
     if stride % 2 == 0:
-        return values[first + stride // 2]
+        out[:, 1::2] = values[first + stride // 2]
+        return out
     left, right = (first + last) // 2, (first + last + 1) // 2
     before, after = np.maximum(left - 1, 0), np.minimum(right + 1, len(values) - 1)
     linear = 0.5 * (values[left] + values[right])
@@ -216,4 +215,5 @@ def _halfway(values: np.ndarray, time_s: np.ndarray, sample: np.ndarray) -> np.n
     even = (np.abs(time_s[left] - time_s[before] - gap) < 0.1 * gap) & (
         np.abs(time_s[after] - time_s[right] - gap) < 0.1 * gap
     )
-    return linear + np.where(even.reshape(even.shape + (1,) * (values.ndim - 1)), bend, 0.0)
+    out[:, 1::2] = linear + np.where(even.reshape(even.shape + (1,) * (values.ndim - 1)), bend, 0.0)
+    return out

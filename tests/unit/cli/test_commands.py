@@ -109,7 +109,7 @@ def test_a_verdict_has_the_bytes_of_the_workflow_and_a_mismatch_is_no_error(flig
     done = invoke("verdict", flights, "-o", tmp_path / "out", "--json", "-q")
     assert done.exit_code == 0, done.output
     names = ("verdict.json", "report.html", "improved_vehicle.yaml")
-    deliver(read_set(flights), *(tmp_path / "flow" / n for n in names))
+    deliver(read_set(flights), tmp_path / "flow")
     for name in names:
         assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "flow" / name).read_bytes()
     assert json.loads(done.stdout)["set"] == "flights"
@@ -289,7 +289,7 @@ def test_a_verdict_says_which_options_play_no_part_for_a_set(flights: Path, tmp_
     def stop(*_):
         raise InputError("judged")
 
-    monkeypatch.setattr("rotorid.cli.verdicts.deliver_set", stop)
+    monkeypatch.setattr("rotorid.cli.verdicts.write_verdict", stop)
     done = invoke("verdict", flights, "-o", tmp_path / "out", "--mass-kg", "3", "--like", "x500")
     assert "--mass-kg and --like play no part" in done.stderr and str(flights / "vehicle.yaml") in done.stderr
     assert invoke("verdict", flights, "-o", tmp_path / "out").stderr == "rotorid: judged\n"

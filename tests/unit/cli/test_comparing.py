@@ -9,6 +9,7 @@ import pytest
 from rotorid.cli.console import keep
 from rotorid.cli.junit import as_junit
 from rotorid.cli.modelling import fly
+from rotorid.cli.sets import Stated
 from rotorid.cli.verdicts import explanation_takes, one_flight, read_given
 from rotorid.errors import InputError
 from rotorid.recordings import read_set, templates
@@ -31,7 +32,7 @@ def logs(tmp_path_factory) -> list[Path]:
 
 def read(paths: list[Path], **of_vehicle) -> list:
     """The sets of what a comparison is given."""
-    return [one.recordings for one in read_given(paths, **of_vehicle)]
+    return [one.recordings for one in read_given(paths, Stated(**of_vehicle))]
 
 
 def test_logs_become_sets_of_one_vehicle(logs: list[Path]) -> None:

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from html import unescape
 from importlib.resources import files
 from pathlib import Path
 from urllib.parse import quote
@@ -22,6 +23,7 @@ pytest.importorskip("uvicorn")
 
 from rotorid.cli.page import jobs
 from rotorid.cli.page.shelf import INTERRUPTED, NotThere, Shelf, safe_name
+from rotorid.recordings.importers.logfile import importers
 from tests.browser import CHROMIUM, Browser
 from tests.command_line import refusal
 from tests.public_logs import public
@@ -125,6 +127,11 @@ def test_only_the_address_with_its_token_and_its_own_host_is_answered(page: Page
         assert status == 403 and text.decode().count(".") <= 4, headers
     assert page.raw("GET", own, headers={"Host": f"localhost:{page.port}"})[0] == 200
     assert page.raw("POST", f"{own}api/sets", b"", {"Origin": f"http://127.0.0.1:{page.port}"})[0] == 201
+
+
+def test_the_page_names_every_format_that_an_importer_takes(page: Page) -> None:
+    text = unescape(page.raw("GET", f"/{page.token}/")[1].decode())
+    assert all(importer.title.replace("`", "") in text for importer in importers().values())
 
 
 def test_the_folder_of_a_bag_is_one_log(page: Page, tmp_path: Path) -> None:

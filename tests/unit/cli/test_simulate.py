@@ -74,6 +74,14 @@ def test_what_is_flown_otherwise_is_said(tmp_path):
     assert said[2].endswith("The vehicle sinks: all that its rotors can do carries 64 % of what hover needs.")
 
 
+@pytest.mark.parametrize(("k_d", "said_of"), [(1e-3, "at most"), (-1e-4, "at least"), (1.2e-4, None)])
+def test_a_parameter_beyond_its_bound_is_said(tmp_path, k_d: float, said_of: str | None):
+    said, _ = simulated(tmp_path, {"id": "rotor_drag", "form": "at the hubs", "parameters": {"k_d": k_d}})
+    doubts = [line for line in said.splitlines() if "The k_d of rotor_drag (at the hubs) is" in line]
+    assert len(doubts) == (said_of is not None)
+    assert not doubts or f"is {k_d:.4g}, beyond" in doubts[0] and f"({said_of} " in doubts[0]
+
+
 def test_a_vehicle_that_turns_over_is_said(tmp_path):
     tipping = {"id": "flapping_moment", "form": "at the hubs", "parameters": {"k_flap": -1e-4}}
     said, _ = simulated(tmp_path, tipping, seconds=3)

@@ -28,8 +28,8 @@ from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet
 from rotorid.vehicle.improved import (
     active_forms,
-    active_set_forms,
     active_speed_forms,
+    all_forms,
     record_as_stated,
     simulate_as_stated,
     speeds_of_commands,
@@ -445,7 +445,7 @@ def test_a_fault_spoils_its_columns_and_no_other(sound, effect, form):
 @pytest.mark.parametrize(("effect", "form"), list(set_forms()))
 def test_a_fault_of_the_vehicle_file_is_recorded(effect, form):
     stated = audit_vehicle(effects=(entry(effect.id, form, form.example),))
-    assert [f.name for f, _ in active_set_forms(stated)] == [form.name] and not active_forms(stated)
+    assert [f.name for f, _ in all_forms(stated)] == [form.name] and not active_forms(stated)
     handed = record_as_stated(fly(), stated, "r")
     expected = form.apply(record_as_stated(fly(), audit_vehicle(), stated.name), np.array(form.example))
     assert handed.vehicle == expected.vehicle and not handed.vehicle.effects

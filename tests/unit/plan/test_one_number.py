@@ -22,8 +22,7 @@ def verdict(tmp_path_factory) -> Path:
     (case,) = [c for c in look_alikes() if c.name == CASE]
     build(case, folder, folder / "answers")
     out = folder / "verdict"
-    paths = [out / name for name in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-    write_files(analysis_of(read_set(folder / case.set_name)), *paths)
+    write_files(analysis_of(read_set(folder / case.set_name)), out)
     return out
 
 

@@ -69,7 +69,7 @@ def test_the_page_is_whole_and_the_same_twice(tmp_path, findings, shown):
     made = analysis(findings=findings, dash=bool(findings))
     for name in ("one", "two"):
         out = tmp_path / name
-        verdict = write_files(made, out / "verdict.json", out / "report.html", out / "improved_vehicle.yaml")
+        verdict = write_files(made, out)
     page = (tmp_path / "one" / "report.html").read_text()
     assert page == (tmp_path / "two" / "report.html").read_text()
     assert shown in page

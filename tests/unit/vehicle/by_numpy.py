@@ -130,18 +130,14 @@ def _fly(vehicle, body, kernels, start, steps, step_s, commands, **given) -> Tra
 
 def _fly_windows(vehicle, body, kernels, start, time_s, *driven) -> np.ndarray:
     """As `rotorid.vehicle.fast.fly_windows`."""
-    *pairs, height_offset = driven
+    *series, height_offset = driven
     states = [start]
     for j in range(time_s.shape[1] - 1):
         step_s = time_s[:, j + 1] - time_s[:, j]
 
         def derivative(share, state, j=j, step_s=step_s):
-            at = {0.0: (0, j), 0.5: (1, j), 1.0: (0, j + 1)}[share]
-            speed, turning_up, wind, push = (
-                pair[at[0]][:, at[1]] if len(pair[0]) else None for pair in zip(pairs[::2], pairs[1::2], strict=True)
-            )
+            speed, turning_up, wind, push = (values[:, int(2 * (j + share))] for values in series)
             motion = _motion(state, time_s[:, j] + share * step_s, speed, turning_up, wind, height_offset)
-            push = np.zeros((len(state), 6)) if push is None else push
             return _rates(vehicle, state, motion, *accelerations(vehicle, kernels, motion, push))
 
         states.append(rk4_step(derivative, states[-1], step_s[:, None]))

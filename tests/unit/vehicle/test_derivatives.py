@@ -252,7 +252,7 @@ def test_next_to_a_log_the_companion_flies_too(form, module, window_wind):
     vehicle = stated(templates.read("x500"))
     window = replace(hovering(vehicle, (2.0, -1.0, 0.5)), wind=np.array(window_wind))
     (flown,) = next_to_log.FLYERS[form][2](vehicle, export_vehicle(vehicle, form), [window])
-    (ours,) = next_to_log.as_expressed(form)(vehicle, export_vehicle(vehicle, form), [window])
+    (ours,) = next_to_log.as_expressed(form, vehicle, export_vehicle(vehicle, form), [window])
     np.testing.assert_allclose(flown.velocity, ours.velocity, atol=1e-7)
     np.testing.assert_allclose(flown.angular_velocity, ours.angular_velocity, atol=1e-7)
 

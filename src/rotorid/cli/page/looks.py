@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from rotorid.cli.sets import Stated
 from rotorid.errors import InputError
 from rotorid.recordings import RecordingSet, Vehicle, templates
 from rotorid.recordings import columns as c
@@ -43,18 +44,17 @@ class Wishes:
             raise InputError(f"{wrong[0]} is expected as text")
         return cls(mass, **texts)
 
-    def files(self, folder: Path) -> tuple[float | None, str | None, Path | None, Path | None]:
-        """Mass, template, vehicle's file and mapping's file, as the importers take them; the texts are written."""
-        paths = []
-        for name in ("vehicle", "mapping"):
-            path, text = folder / f"stated_{name}.yaml", getattr(self, name)
+    def stated(self, folder: Path) -> Stated:
+        """The same as the commands take it; the texts are written into a folder."""
+        paths: dict[str, Path | None] = {}
+        for name, text in (("vehicle", self.vehicle), ("mapping", self.mapping)):
+            path = folder / f"stated_{name}.yaml"
             if text.strip():
                 path.write_text(text, encoding="utf-8")
             else:
                 path.unlink(missing_ok=True)
-            paths.append(path if text.strip() else None)
-        vehicle, mapping = paths
-        return (None, None, vehicle, mapping) if vehicle else (self.mass_kg, self.like or None, None, mapping)
+            paths[name] = path if text.strip() else None
+        return Stated(**paths) if paths["vehicle"] else Stated(self.mass_kg, self.like or None, **paths)
 
 
 def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
@@ -64,15 +64,13 @@ def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
     proposal of what they are (`mapping`, `evidence`, `open`) and no flights.
     """
     from rotorid.recordings.importers.logfile import importer_of, set_of_logs
-    from rotorid.recordings.importers.mapping import read_mapping
 
-    mass_kg, like, vehicle, mapping = wishes.files(folder)
-    formats = [importer_of(path) for path in logs]
-    if mapping is None and formats[0].name == "table" and (guessed := _guessed(logs[0])):
+    stated, formats = wishes.stated(folder), [importer_of(path) for path in logs]
+    if stated.mapping is None and formats[0].name == "table" and (guessed := _guessed(logs[0])):
         return guessed | {"format": formats[0].title, "templates": known_templates()}
-    unknown = like is None and vehicle is None and not formats[0].template
-    read = read_mapping(mapping) if mapping else None
-    found = set_of_logs(logs, logs[0].name.split(".")[0], mass_kg, like or (_USUAL if unknown else None), vehicle, read)
+    unknown = stated.like is None and stated.vehicle is None and not formats[0].template
+    name, like = logs[0].name.split(".")[0], _USUAL if unknown else stated.like
+    found = set_of_logs(logs, name, stated.mass_kg, like, stated.vehicle, stated.columns())
     recordings, refused = found.recordings(), ""
     believed = recordings.vehicle
     try:
@@ -93,7 +91,7 @@ def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
         "mass_kg": believed.mass_kg,
         "mass_why": mass_why.replace(" and give --mass-kg", ""),
         "remarks": [r for r in found.remarks if r != mass_why],
-        "like": like or ("" if unknown else _template_of(found.remarks)),
+        "like": stated.like or ("" if unknown else _template_of(found.remarks)),
         "templates": known_templates(),
         "vehicle": found.vehicle_text,
         "mapping": wishes.mapping,
@@ -140,21 +138,17 @@ def _can(recordings: RecordingSet, columns: Sequence[str]) -> list[str]:
     def has(*names: str) -> bool:
         return set(names) <= set(columns)
 
-    count, out = vehicle.rotor_count, []
-    speeds = has(*c.rotor_columns("rotor_speed", count))
-    drives = has(*c.rotor_columns("throttle", count)) or has(*c.rotor_columns("rotor_command", count))
-    if speeds:
-        out.append(
-            "Rotor speeds are recorded: thrust, mass, battery and differences between rotors can be distinguished."
-        )
-    if drives:
-        out.append("Commands are recorded: how thrust follows them (curve, lag, delay) can be asked.")
-    if has(*c.SPECIFIC_FORCE):
-        out.append("The accelerometer is there: forces are compared with those that the model expects.")
-    if has(*c.ANGULAR_VELOCITY):
-        out.append("The gyroscope is there: moments, the inertia and the places of rotors and weights can be asked.")
-    if has(*c.VELOCITY) or has(*c.POSITION):
-        out.append("Velocity is there: drag of rotors and frame, and wind, can be asked.")
-    if has(c.BATTERY_VOLTAGE):
-        out.append("The battery's voltage is there: how thrust falls with it can be asked.")
-    return out
+    speeds, throttles, commands = (
+        has(*c.rotor_columns(name, vehicle.rotor_count)) for name in ("rotor_speed", "throttle", "rotor_command")
+    )
+    answers = {
+        "Rotor speeds are recorded: thrust, mass, battery and differences between rotors can be distinguished.": speeds,
+        "Commands are recorded: how thrust follows them (curve, lag, delay) can be asked.": throttles or commands,
+        "The accelerometer is there: forces are compared with those that the model expects.": has(*c.SPECIFIC_FORCE),
+        "The gyroscope is there: moments, the inertia and the places of rotors and weights can be asked.": has(
+            *c.ANGULAR_VELOCITY
+        ),
+        "Velocity is there: drag of rotors and frame, and wind, can be asked.": has(*c.VELOCITY) or has(*c.POSITION),
+        "The battery's voltage is there: how thrust falls with it can be asked.": has(c.BATTERY_VOLTAGE),
+    }
+    return [sentence for sentence, known in answers.items() if known]

@@ -13,6 +13,7 @@ import json
 import secrets
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
+from html import escape
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from rotorid.cli.page.jobs import Looker, Queue
 from rotorid.cli.page.looks import Wishes
 from rotorid.cli.page.shelf import WORKING, NotThere, Shelf, safe_name
 from rotorid.errors import InputError
+from rotorid.recordings.importers.logfile import importers
 
 LARGEST_LOG = 500_000_000
 """Bytes of a log that the page takes; larger ones are for the command line."""
@@ -109,6 +111,8 @@ def application(shelf: Shelf, token: str, hosts: tuple[str, ...], largest_log: i
         if name not in _KINDS:
             raise NotThere(name)
         text = files("rotorid.cli.page").joinpath("files", name).read_text(encoding="utf-8")
+        if name == "page.html":
+            text = text.replace("{{ formats }}", escape(_formats()))
         return Response(text, media_type=_KINDS[name], headers={"Content-Security-Policy": _POLICY})
 
     async def listing(request: Request) -> Response:
@@ -213,6 +217,12 @@ def application(shelf: Shelf, token: str, hosts: tuple[str, ...], largest_log: i
     no_such = {number: _no_such for number in (404, 405)}
     app = Starlette(routes=[Mount(f"/{token}", routes=here)], lifespan=life, exception_handlers=no_such)
     return Guard(app, token, hosts)
+
+
+def _formats() -> str:
+    """What importers there are, the one that takes any table last."""
+    known = sorted(importers().values(), key=lambda importer: importer.name == "table")
+    return "; ".join(importer.title.replace("`", "") for importer in known)
 
 
 async def _no_such(request: Request, error: Exception) -> Response:

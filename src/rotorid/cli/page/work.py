@@ -23,12 +23,11 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from rotorid.cli.console import Waiting, keep, read_record, sentence_of
+from rotorid.cli.console import heard, sentence_of
 from rotorid.cli.page.looks import Wishes, look
 from rotorid.cli.page.shelf import ANSWER, LOGS, SET, STATE
 from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
-from rotorid.steps import heard_by
 
 
 def _speaker() -> Callable[..., None]:
@@ -84,23 +83,20 @@ def _sentence_on(error: Exception, folder: Path) -> str:
 @contextmanager
 def _heard(command: str, say: Callable[..., None]) -> Iterator[None]:
     """Inside, it is said every second at which step the work is and how long is left, where earlier runs tell."""
-    say_every_s = 1.0
-    waiting, over = Waiting(read_record().get(command, [])), threading.Event()
+    say_every_s, over = 1.0, threading.Event()
+    with heard(command) as waiting:
 
-    def tell() -> None:
-        while not over.wait(say_every_s):
-            say(step=": ".join(waiting.path[-2:]) or "reading", line=waiting.line().strip())
+        def tell() -> None:
+            while not over.wait(say_every_s):
+                say(step=": ".join(waiting.path[-2:]) or "reading", line=waiting.line().strip())
 
-    teller = threading.Thread(target=tell, daemon=True)
-    teller.start()
-    try:
-        with heard_by(waiting.heard):
+        teller = threading.Thread(target=tell, daemon=True)
+        teller.start()
+        try:
             yield
-    finally:
-        over.set()
-        teller.join()
-    waiting.heard(())
-    keep(command, waiting.done)
+        finally:
+            over.set()
+            teller.join()
 
 
 def _verdict(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> dict[str, Any]:
@@ -113,9 +109,9 @@ def _verdict(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> d
     own, answer = folder / SET / logs[0].name.split(".")[0], folder / ANSWER
     shutil.rmtree(folder / SET, ignore_errors=True)
     with _heard("verdict", say):
-        mass_kg, like, vehicle, mapping = Wishes(**state["wishes"]).files(folder)
+        stated = Wishes(**state["wishes"]).stated(folder)
         say(step="importing", line="importing the logs")
-        make_set(logs, own, mass_kg, like, vehicle, mapping)
+        make_set(logs, own, stated)
         found = write_verdict(own, answer)
     _pack(own, answer / "recording_set.zip")
     exported = _exports(answer)
@@ -172,7 +168,7 @@ def _compare(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> d
         say(said=said)
 
     with _heard("compare on the page", say):
-        found, changed = compared(logs, tell, lambda command: nullcontext(), *Wishes(**state["wishes"]).files(folder))
+        found, changed = compared(logs, tell, lambda command: nullcontext(), Wishes(**state["wishes"]).stated(folder))
     texts = {"changes.html": make_changes_page(found), "changes.json": changes_text(found, changed)}
     write_texts({answer / name: text for name, text in texts.items()})
     first, *more = sentences(found)

@@ -33,27 +33,21 @@ def quoted(channel: Channel) -> Errors:
     return channel.rmse.training if channel.rmse.held_out.named is None else channel.rmse.held_out
 
 
-def _energies(channels: Mapping[str, Channel], located: Sequence[str]) -> tuple[float, float, float]:
-    """Energies before, with what is named, and of the noise floor over located channels, each in units of its floor."""
-    before = named = noise = 0.0
+def share_left(channels: Mapping[str, Channel], locations: Sequence[Location], samples: Mapping[str, int]) -> float:
+    """Share of the mismatch that is left, from the errors printed; of an error that is by chance what it is, none.
+
+    Over the channels in which the mismatch is located; all of force and moment where a fault of the set left no place.
+    """
+    named_there = {location.channel for location in locations}
+    located = [c for c in channels if c in named_there] or list(channels)
+    before = named = noise = 0.0  # energies, each in units of its channel's floor
     for name in located:
         errors, floor = quoted(channels[name]), channels[name].noise_floor
-        if errors.before is None or errors.named is None or not floor:
-            continue
-        before, named, noise = before + (errors.before / floor) ** 2, named + (errors.named / floor) ** 2, noise + 1.0
-    return before, named, noise
-
-
-def share_left(channels: Mapping[str, Channel], located: Sequence[str], samples: Mapping[str, int]) -> float:
-    """Share of the mismatch that is left, from the errors printed; of an error that is by chance what it is, none."""
-    before, named, noise = _energies(channels, located)
+        if errors.before is not None and errors.named is not None and floor:
+            before, named, noise = before + (errors.before / floor) ** 2, named + (errors.named / floor) ** 2, noise + 1
     if before <= noise * _by_chance(min((samples[name] for name in located), default=1)) ** 2:
         return 0.0
     return min(1.0, max(0.0, named - noise) / max(before - noise, noise)) if noise else 0.0
-
-
-MOST_OFF = 0.2
-"""Share of the weight that a force may be off by in what is called explained."""
 
 
 def verdict_word(
@@ -65,36 +59,19 @@ def verdict_word(
     """
     if not with_status(analysis, *CLAIMED) and not analysis.wrong_values:
         return "unexplained" if locations else "no_mismatch"
+    most_off, vehicle = 0.2, analysis.believed
+    if left <= EXPLAINED_SHARE and vehicle.kind == "flight":
+        forces = (c.rmse.held_out.named or 0.0 for name, c in channels.items() if name.startswith("force"))
+        off = max(forces, default=0.0) > most_off * vehicle.mass_kg * vehicle.gravity_m_s2
+        return "partly_explained" if off else "explained"
     if left <= EXPLAINED_SHARE:
-        return "partly_explained" if _force_is_off(analysis, channels) else "explained"
+        return "explained"
     return "partly_explained" if left < 1.0 - EXPLAINED_SHARE else "unexplained"
-
-
-def _force_is_off(analysis: Analysis, channels: Mapping[str, Channel]) -> bool:
-    """Whether some force of a flight is off by more than MOST_OFF of the weight with what is named."""
-    vehicle = analysis.believed
-    if vehicle.kind != "flight":
-        return False
-    forces = [c.rmse.held_out for name, c in channels.items() if name.startswith("force")]
-    off_n = max((errors.named for errors in forces if errors is not None), default=0.0)
-    return off_n > MOST_OFF * vehicle.mass_kg * vehicle.gravity_m_s2
-
-
-def located_channels(locations: Sequence[Location], channels: Mapping[str, Channel]) -> tuple[str, ...]:
-    """Channels in which the mismatch is located; all of force and moment where a fault of the set left no place."""
-    named = {location.channel for location in locations}
-    return tuple(c for c in channels if c in named) or tuple(channels)
 
 
 def _by_chance(samples: int) -> float:
     """Ratio of two root mean squares of so many samples of one noise that hardly any exceeds."""
     return float(np.sqrt(f.isf(_CHANCE, samples, samples)))
-
-
-def _plainly_off(samples: int) -> float:
-    """Error in units of the noise floor from which a channel is off, where both come of so few samples."""
-    plainly_off = 1.5
-    return max(plainly_off, _BEYOND_CHANCE * _by_chance(samples))
 
 
 def missing_places(
@@ -115,13 +92,15 @@ def missing_places(
             there.add(own[0])
     if not there and not analysis.wrong_values:
         out |= {c: analysis.p_values.get(c, (1.0, 1.0))[1] for c in analysis.unexplained_channels if c in channels}
+    plainly_off = 1.5  # Error in units of the noise floor from which a channel is off, unless few samples allow more.
     # Where nothing is stated, values corrected within their trust may be all that it takes.
     stated = with_status(analysis, *CLAIMED) or analysis.wrong_values
     for name, channel in channels.items():
         both = (channel.rmse.held_out, channel.noise_floor), (channel.rmse.training, analysis.noise_floor.get(name))
         errors = [x / n for e, n in both if (x := e.before if stated else e.named) is not None and n]
         wrench = name.split("_")[0] in ("force", "moment")
-        if wrench and name not in there and max(errors, default=0.0) > _plainly_off(samples[name]):
+        allowed = max(plainly_off, _BEYOND_CHANCE * _by_chance(samples[name])) if wrench else np.inf
+        if name not in there and max(errors, default=0.0) > allowed:
             out.setdefault(name, analysis.p_values.get(name, (1.0, 1.0))[0])
     return [(c, p) for c, p in out.items() if c not in {location.channel for location in locations}]
 

@@ -27,7 +27,7 @@ from rotorid.mismatch.deliver.files import (
 from rotorid.mismatch.deliver.flown import UNITS, Model, WindowErrors, between, driven_by, errors_of, model_of, predict
 from rotorid.mismatch.evidence.motion import Segment, SensorNoise
 from rotorid.mismatch.flight.prepare import sensor_noise
-from rotorid.mismatch.tell.verdict import Channel, Errors, PValues, SplitErrors, reached
+from rotorid.mismatch.tell.verdict import Channel, channel_of
 from rotorid.steps import step
 from rotorid.vehicle.windows import States
 
@@ -38,13 +38,15 @@ def forward_channels(analysis: Analysis) -> tuple[dict[str, Channel], tuple[str,
     vehicle = analysis.recordings.vehicle
     if vehicle.kind != "flight":
         return {}, ()
-    segments, notes = _segments(analysis), []
+    segments, notes = simulated_segments(analysis), []
     if not segments:
         return {}, ("No simulation run forward: rotor speeds and body rates are not recorded together.",)
+    named = with_effects(analysis.named, [f for f in claimed(analysis.findings) if place_of(f) == "vehicle"])
     models = {
         "before": Model(analysis.believed),
         "refitted": Model(analysis.refitted),
-        "named": _named_model(analysis),
+        # All that is claimed in the conditions of the runs, whatever is delivered.
+        "named": model_of(named, conditions_of(analysis), instruments_of(analysis)),
         "after": delivered_model(analysis),
     }
     errors: dict[str, list[WindowErrors]] = {}
@@ -60,28 +62,14 @@ def forward_channels(analysis: Analysis) -> tuple[dict[str, Channel], tuple[str,
     if lacking := [name.replace("_", " ") for name in UNITS if name not in there]:
         notes.append(f"Not run forward for want of recorded columns: {', '.join(lacking)}.")
     for name in filter(there.__contains__, UNITS):
-        of_training, of_held_out = (
-            Errors(**{stage: _rms(found, name, part, sign) for stage, found in errors.items()}) for sign in (1, -1)
-        )
-        rmse = SplitErrors(training=of_training, held_out=of_held_out)
-        channels[name] = Channel(
-            unit=UNITS[name],
-            noise_floor=reached(floor.get(name), rmse.held_out),
-            rmse=rmse,
-            p_value=PValues(before=None, after=None),
-        )
+        both = ({stage: _rms(found, name, part, sign) for stage, found in errors.items()} for sign in (1, -1))
+        channels[name] = channel_of(UNITS[name], floor.get(name), *both)
     return channels, tuple(notes)
 
 
 def delivered_model(analysis: Analysis) -> Model:
     """The improved vehicle in the conditions of its runs, read by the instruments as they were found."""
     return model_of(improved_vehicle(analysis), conditions_of(analysis), instruments_of(analysis))
-
-
-def _named_model(analysis: Analysis) -> Model:
-    """The vehicle with all that is claimed, in the conditions of its runs, whatever is delivered."""
-    named = with_effects(analysis.named, [f for f in claimed(analysis.findings) if place_of(f) == "vehicle"])
-    return model_of(named, conditions_of(analysis), instruments_of(analysis))
 
 
 def prove(analysis: Analysis, reloaded: Model, channels: Mapping[str, Channel], notes: Sequence[str]) -> None:
@@ -91,7 +79,7 @@ def prove(analysis: Analysis, reloaded: Model, channels: Mapping[str, Channel], 
     """
     # Relative difference above which a vehicle read back is not the model written (errors are stated to six digits).
     same = 1e-5
-    segments = _segments(analysis)
+    segments = simulated_segments(analysis)
     if not channels or not segments or any("leaves out" in note for note in notes):
         return
     errors, part = errors_of(segments, reloaded), fitted_part(analysis)
@@ -105,7 +93,7 @@ def prove(analysis: Analysis, reloaded: Model, channels: Mapping[str, Channel], 
                 )
 
 
-def _segments(analysis: Analysis) -> list[Segment]:
+def simulated_segments(analysis: Analysis) -> list[Segment]:
     """Stretches of flight that can be simulated."""
     return [
         s for s in segments_of(analysis) if s.motion.rotor_speed is not None and s.motion.angular_velocity is not None

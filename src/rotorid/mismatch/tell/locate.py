@@ -87,8 +87,7 @@ def locate(analysis: Analysis) -> list[Location]:
         if not found and not stated:
             found += throughout
     found += _unexplained(analysis, segments)
-    traces = list(dict.fromkeys((t.channel, t.run) for t in analysis.traces))
-    order = {key: k for k, key in enumerate(traces)}
+    order = {key: k for k, key in enumerate(dict.fromkeys((t.channel, t.run) for t in analysis.traces))}
     located = stated + _worded(analysis, _disjoint(found, order))
     return sorted(located, key=lambda loc: (order.get((loc.channel, loc.run), -1), loc.run, loc.start_s))
 
@@ -100,17 +99,10 @@ def _worded(analysis: Analysis, intervals: Sequence[_Interval]) -> list[Location
         key = (i.trace.channel, i.explained)
         if key not in regimes and not i.of_the_run:
             regimes[key] = _regime_of(analysis, *key)
-        out.append(
-            Location(
-                run=i.trace.run,
-                channel=i.trace.channel,
-                start_s=_edge(analysis, i, i.start, 0),
-                stop_s=_edge(analysis, i, i.stop - 1, -1),
-                p_value=i.p_value,
-                energy_share=_energy_share(_mismatch_of(i.trace, i.explained), slice(i.start, i.stop)),
-                regime=None if i.of_the_run else regimes[key],
-            )
-        )
+        start_s, stop_s = _edge(analysis, i, i.start, 0), _edge(analysis, i, i.stop - 1, -1)
+        share = _energy_share(_mismatch_of(i.trace, i.explained), slice(i.start, i.stop))
+        regime = None if i.of_the_run else regimes[key]
+        out.append(Location.filled(i.trace.run, i.trace.channel, start_s, stop_s, i.p_value, share, regime))
     return out
 
 
@@ -174,17 +166,7 @@ def _stated(analysis: Analysis) -> list[Location]:
                         share = _energy_share(_mismatch_of(trace, True), inside)
                 if channel not in regimes:
                     regimes[channel] = _regime_of(analysis, channel, True)
-                out.append(
-                    Location(
-                        run=run,
-                        channel=channel,
-                        start_s=start_s,
-                        stop_s=stop_s,
-                        p_value=finding.p_value,
-                        energy_share=share,
-                        regime=regimes[channel],
-                    )
-                )
+                out.append(Location.filled(run, channel, start_s, stop_s, finding.p_value, share, regimes[channel]))
     return out
 
 
@@ -344,9 +326,7 @@ def _sensor_differences(analysis: Analysis) -> dict[tuple[str, str, float], np.n
 def _of_one_sensor(interval: _Interval, differences: Mapping[tuple[str, str, float], np.ndarray]) -> bool:
     """Whether most of the residual there is a difference between the accelerometer and the velocity."""
     trace, part = interval.trace, slice(interval.start, interval.stop)
-    difference = differences.get((trace.run, trace.channel, float(trace.time_s[0])))
-    if difference is None:
-        return False
+    difference = differences.get((trace.run, trace.channel, float(trace.time_s[0])), np.zeros(len(trace.named)))
     left, whole = (float(np.nansum(x[part] ** 2)) for x in (trace.named - difference, trace.named))
     return left < 0.5 * whole
 
@@ -382,12 +362,11 @@ def _evened(traces: Sequence[ChannelTrace], white: list[np.ndarray], hard) -> li
     x = np.concatenate([e[::n] for e, n in zip(efforts, lengths, strict=True)])
     y = np.concatenate([e[::n] for e, n in zip(energies, lengths, strict=True)])
     scale = np.maximum(x.mean(axis=0), 1e-300)
-    usual = np.full(len(y), max(float(np.median(y)), 1e-300))
+    usual, floor = np.full(len(y), max(float(np.median(y)), 1e-300)), 1e-3 * float(np.median(y)) + 1e-300
     for _ in range(3):
         weight = 1.0 / usual
         coefficients, _ = nnls(x / scale * weight[:, None], np.minimum(y, held_back * usual) * weight)
-        usual = np.maximum(x / scale @ coefficients, 1e-3 * float(np.median(y)) + 1e-300)
-    floor = 1e-3 * float(np.median(y)) + 1e-300
+        usual = np.maximum(x / scale @ coefficients, floor)
     return [w / np.sqrt(np.maximum(e / scale @ coefficients, floor)) for w, e in zip(white, efforts, strict=True)]
 
 
@@ -420,12 +399,6 @@ def _flagged(series: Sequence[np.ndarray], hits: Iterable[tuple[int, int, np.nda
     return [(k, a, b, lowest[k]) for k, mask in enumerate(flagged) for a, b in stretches(mask)]
 
 
-def _nearby(trace: ChannelTrace, start: int, stop: int) -> slice:
-    """A stretch and a second on either side: where its edges are looked for."""
-    reach = int(round(1.0 / _period(trace)))
-    return slice(max(start - reach, 0), min(stop + reach, len(trace.named)))
-
-
 def _louder(traces, white, limit) -> list[_Interval]:
     """Windows with more energy than the spread of the windows' energies allows."""
     moves_s = 0.2  # Lags over which larger residuals may follow each other.
@@ -442,10 +415,9 @@ def _louder(traces, white, limit) -> list[_Interval]:
     out = []
     for k, start, stop, p in _flagged(white, hits):
         trace, w = traces[k], white[k]
-        here = _nearby(trace, start, stop)
         variance = max(float(np.mean(w[start:stop] ** 2)), 1.2)
-        likelihood = -0.5 * np.log(variance) + 0.5 * w[here] ** 2 * (1.0 - 1.0 / variance)
-        first, last = (here.start + edge for edge in _best_segment(likelihood))
+        likelihood = -0.5 * np.log(variance) + 0.5 * w**2 * (1.0 - 1.0 / variance)
+        first, last = _best_segment(trace, start, stop, likelihood)
         if _moves(w[first:last], w, int(moves_s / _period(trace))):
             out.append(_Interval(trace, first, last, p, False))
     return out
@@ -488,20 +460,20 @@ def _shifted(traces, white, parts, limit) -> list[_Interval]:
             hits.append((k, length, p, (p < limit) & (np.abs(local[k]) > _SHIFTED * noise)))
     out = []
     for k, start, stop, p in _flagged(white, hits):
-        here = _nearby(traces[k], start, stop)
         level = float(np.mean(parts[k][start:stop]))
-        first, last = (here.start + edge for edge in _best_segment(level * parts[k][here] - 0.5 * level**2))
+        first, last = _best_segment(traces[k], start, stop, level * parts[k] - 0.5 * level**2)
         out.append(_Interval(traces[k], first, last, p, False))
     return out
 
 
-def _best_segment(gain: np.ndarray) -> tuple[int, int]:
-    """Start and stop (exclusive) of the stretch with the largest sum: the most likely segment."""
-    total = np.concatenate([[0.0], np.cumsum(gain)])
-    lowest = np.minimum.accumulate(total)
-    stop = int(np.argmax(total - lowest))
-    start = int(np.argmin(total[: stop + 1]))
-    return start, max(stop, start + 1)
+def _best_segment(trace: ChannelTrace, start: int, stop: int, gain: np.ndarray) -> tuple[int, int]:
+    """Start and stop (exclusive) of the most likely segment, of the largest sum, within a second of a stretch."""
+    reach = int(round(1.0 / _period(trace)))
+    begin, end = max(start - reach, 0), min(stop + reach, len(trace.named))
+    total = np.concatenate([[0.0], np.cumsum(gain[begin:end])])
+    last = int(np.argmax(total - np.minimum.accumulate(total)))
+    first = int(np.argmin(total[: last + 1]))
+    return begin + first, begin + max(last, first + 1)
 
 
 def _disjoint(intervals: Sequence[_Interval], order: Mapping[tuple[str, str], int]) -> list[_Interval]:

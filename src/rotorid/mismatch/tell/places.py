@@ -9,6 +9,7 @@ import numpy as np
 
 from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, rms
 from rotorid.mismatch.decide.sizes import Size, drift_m, fitted_part, scales
+from rotorid.mismatch.decide.words import number, regime_words
 
 if TYPE_CHECKING:
     from rotorid.mismatch.tell.verdict import Location, Regime
@@ -18,6 +19,12 @@ def in_a_regime(place: Location) -> bool:
     """Whether a place is said by what was flown, and not by the time."""
     regime = place.regime
     return regime is not None and regime.variable != "time_s" and None not in (regime.low, regime.high)
+
+
+def range_words(regime: Regime) -> str:
+    """`airspeed 3 to 7 m/s`."""
+    name, unit = regime_words(regime.variable, regime.either_sign)
+    return f"{name} {number(regime.low)} to {number(regime.high)} {unit}".strip()
 
 
 def regime_values(known: Mapping[str, np.ndarray], regime: Regime) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -46,7 +46,7 @@ _NO_BETTER = 0.02
 """Relative change of an error run forward below which it is neither better nor worse."""
 
 
-_SizeWords = Literal["both", "share", "metres", ""]
+_Sizes = Literal["both", "share", "metres", ""]
 """Which sizes stand in a text: share of the weight and metres after half a second."""
 _GROUND_WORDS = (
     ("on flights not used", "on runs not used"),
@@ -69,10 +69,27 @@ class Contents:
     locations: Sequence[Location]
     channels: Mapping[str, Channel]
     """Of the inverse dynamics, or of the reading."""
-    shares: Mapping[str, float]
+    main: str
+    """The channel that the sentence names (`main_channel`)."""
     left: float
     """Share of the mismatch that is left."""
     forward: Mapping[str, Channel]
+
+    @property
+    def main_size(self) -> Size | None:
+        """The size of the error in the main channel as believed."""
+        before = quoted(self.channels[self.main]).before if self.main in self.channels else None
+        return None if before is None else channel_size(self.analysis, self.main, before, "before")
+
+
+def names_of(ids: Iterable[str], last: str = "and") -> str:
+    """`drag, lift and sag`, each effect once."""
+    return listed([effect_words(i) for i in dict.fromkeys(ids)], last)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A number in words with its unit, where it has one."""
+    return text if unit in ("", "-", "1") else f"{text} {unit}"
 
 
 def spoken(text: str, analysis: Analysis) -> str:
@@ -96,7 +113,7 @@ def first_words(text: str, most: int = MOST_WORDS) -> str:
 
 def headline(contents: Contents) -> str:
     """What a pilot reads in at most MOST_WORDS words: where and how much, what was left out, how much better."""
-    analysis = contents.analysis
+    analysis, main = contents.analysis, contents.main
     if contents.word == "not_judged":
         first = next(d for d in analysis.doubts if d.stops)
         return first_words(f"Not judged. {first.sentence}")
@@ -104,32 +121,30 @@ def headline(contents: Contents) -> str:
         return _agreement(analysis, contents.channels)
     stated = with_status(analysis, *CLAIMED)
     if stated and all(_concerns_the_recording(f) for f in stated) and not analysis.wrong_values:
-        rest = "" if contents.word == "explained" else f" {_rest(contents)}"
-        return first_words(f"{_corrected_mistakes(stated)}{rest}")
-    main = main_channel(analysis, contents.locations, contents.channels)
-    places = _places(main, contents)
-    causes = _causes(contents)
+        faults = first_words("; ".join(capital(f.sentence.rstrip(".")) for f in stated), MOST_WORDS - 15)
+        faults += "." if len(stated) == 1 else f" ({len(stated)} faults)."
+        return first_words(faults if contents.word == "explained" else f"{faults} {_rest(contents)}")
+    places, causes = _places(contents), _causes(contents)
     if not causes:
         texts = [capital(f"{where}; {_rest(contents)}") for where in places]
         return next((text for text in texts if len(text.split()) <= MOST_WORDS), first_words(texts[-1]))
-    better = _better_in_short(main, contents.channels)
     rest = "" if contents.word == "explained" else f"; {unexplained_words(contents.left)}"
-    still, short = (_still_off(contents, main, how) for how in ("both", "share"))
+    still, short = (_still_off(contents, how) for how in ("both", "share"))
     surely, where, in_metres, off, off_in_metres, plain = places
     # Where a place is said with its own error, the error that falls is that of the whole.
-    overall = better if where == off else _better_in_short(main, contents.channels, overall=True)
-    for parts in (
-        (surely, causes, overall, rest, still),
-        (where, causes, overall, rest, short),
-        (in_metres, causes, overall, rest, short),
-        (where, causes, "", rest, short),
-        (off, causes, "", rest, short),
-        (off_in_metres, causes, "", rest, short),
-        (off_in_metres, causes, "", "" if short else rest, short),
-        (plain, causes, "", "", short),
-        ("", causes, "", "" if short else rest, short),
+    better = _better_in_short(contents.channels[main], overall=where != off) if main else ""
+    for place, *parts in (
+        (surely, better, rest, still),
+        (where, better, rest, short),
+        (in_metres, better, rest, short),
+        (where, rest, short),
+        (off, rest, short),
+        (off_in_metres, rest, short),
+        (off_in_metres, "" if short else rest, short),
+        (plain, short),
+        ("", "" if short else rest, short),
     ):
-        text = "".join([f"{parts[0]}; " if parts[0] else "", *parts[1:]]) + "."
+        text = "".join([f"{place}; " if place else "", causes, *parts, "."])
         if len(text.split()) <= MOST_WORDS:
             return capital(text)
     return first_words(capital(f"{causes}{short or rest}."))
@@ -142,13 +157,7 @@ def unexplained_words(share: float) -> str:
     return f"{100 * share:.0f} % stays unexplained"
 
 
-def main_size(analysis: Analysis, main: str, channels: Mapping[str, Channel]) -> Size | None:
-    """The size of the error in the main channel as believed."""
-    before = quoted(channels[main]).before if main in channels else None
-    return None if before is None else channel_size(analysis, main, before, "before")
-
-
-def _still_off(contents: Contents, main: str, how: _SizeWords) -> str:
+def _still_off(contents: Contents, how: _Sizes) -> str:
     """The channel that stays off most with what was found, as a clause, with its size as far as asked.
 
     Empty where none is worth a word, or where it is the main one, of which the sentence says so anyway.
@@ -160,7 +169,7 @@ def _still_off(contents: Contents, main: str, how: _SizeWords) -> str:
         if channel in known and named is not None:
             left[channel] = math.sqrt(max(named**2 - (own.noise_floor or 0.0) ** 2, 0.0))
     most = max(left, key=lambda c: left[c] / known[c].value, default=None)
-    if most in (None, main) or left[most] < _WORTH_A_WORD * known[most].value:
+    if most in (None, contents.main) or left[most] < _WORTH_A_WORD * known[most].value:
         return ""
     size = channel_size(contents.analysis, most, left[most], "named")
     off = f"{number(left[most])} {contents.channels[most].unit}"
@@ -170,19 +179,17 @@ def _still_off(contents: Contents, main: str, how: _SizeWords) -> str:
 def details(contents: Contents) -> list[str]:
     """What the sentence has no room for: each effect with its numbers and share, values, what is left, what is run
     forward."""
-    analysis, out = contents.analysis, []
-    for finding in by_share(with_status(analysis, "established"), contents.shares):
-        out.append(_left_out(finding, contents.shares.get(finding.id)))
-    out += [_either(f, analysis) for f in by_share(one_per_class(with_status(analysis, "ambiguous")), contents.shares)]
+    analysis, shares = contents.analysis, contents.analysis.shares
+    out = [_left_out(f, shares.get(f.id)) for f in by_share(with_status(analysis, "established"), shares)]
+    out += [_either(f, analysis) for f in by_share(one_per_class(with_status(analysis, "ambiguous")), shares)]
     out += [_wrong(name, values, analysis.instead.get(name, ())) for name, values in analysis.values.items()]
-    if contents.word != "no_mismatch" and (with_status(analysis, *CLAIMED) or analysis.wrong_values):
-        main = main_channel(analysis, contents.locations, contents.channels)
-        out.append(_better(main, contents.channels, analysis.corrected))
-    for finding in by_share(with_status(analysis, "suggested"), contents.shares):
+    explained = with_status(analysis, *CLAIMED) or analysis.wrong_values
+    if contents.word != "no_mismatch" and explained and contents.main:
+        out.append(_better(contents.main, contents.channels[contents.main], analysis.corrected))
+    for finding in by_share(with_status(analysis, "suggested"), shares):
         name, numbers = capital(effect_words(finding.id)), _parameters(finding)
         out.append(f"{name} is suggested{f' ({numbers})' if numbers else ''}, not established: {finding.objection}.")
-    for name, (values, why) in analysis.suggested_values.items():
-        out.append(_wrong(name, values, why=why))
+    out += [_wrong(name, values, why=why) for name, (values, why) in analysis.suggested_values.items()]
     if contents.word in ("partly_explained", "unexplained"):
         described = analysis.unexplained_description
         out.append(capital(_rest(contents)) + (f" {capital(described)}." if described else ""))
@@ -225,10 +232,10 @@ def _causes(contents: Contents) -> str:
     """Effects and values that carry nine tenths of the error, in a clause."""
     analysis = contents.analysis
     stated = [f for f in one_per_class(with_status(analysis, *CLAIMED)) if not _concerns_the_recording(f)]
-    names = []
-    for finding in carrying(stated, contents.shares):
-        either = dict.fromkeys((finding.id, *(finding.alternatives if finding.status == "ambiguous" else ())))
-        names.append(listed([effect_words(i) for i in either], "or"))
+    names = [
+        names_of((f.id, *(f.alternatives if f.status == "ambiguous" else ())), "or")
+        for f in carrying(stated, analysis.shares)
+    ]
     clauses = []
     if names:
         more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
@@ -237,46 +244,38 @@ def _causes(contents: Contents) -> str:
     wrong, most = list(analysis.wrong_values.items()), max(1, MOST_NAMES - len(names))
     for name, (believed, refitted, _, _) in wrong[:most]:
         words, unit = parameter_words(name)
-        clauses.append(f"the {words} is {f'{number(refitted, 3)} {unit}'.rstrip()}, not {number(believed, 3)}")
+        clauses.append(f"the {words} is {with_unit(number(refitted, 3), unit)}, not {number(believed, 3)}")
     if len(wrong) > most:
         left = len(wrong) - most
         clauses.append(f"{left} more values are wrong" if left > 1 else "one more value is wrong")
     return listed(clauses)
 
 
-def _corrected_mistakes(stated: Sequence[Finding]) -> str:
-    """Faults of the recording, corrected before any physics was looked at."""
-    texts = [capital(f.sentence.rstrip(".")) for f in stated]
-    return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
-
-
-def _off_words(
-    main: str, channels: Mapping[str, Channel], size: Size | None, how: _SizeWords, here: float | None = None
-) -> str:
-    """How much a channel is off, in all or by `here`, in words; with its size, as far as asked."""
-    if not main:
+def _off_words(contents: Contents, size: Size | None, how: _Sizes, here: float | None = None) -> str:
+    """How much the main channel is off, in all or by `here`, in words; with its size, as far as asked."""
+    if not contents.main:
         return "the model and the recordings differ"
-    said = _size_words(size, how) if size is not None else ""
-    off = f"{number(quoted(channels[main]).before if here is None else here)} {channels[main].unit} off"
-    return f"the {channel_words(main)} is {off}{f', {said}' if said else ''}"
+    said, channel = _size_words(size, how) if size is not None else "", contents.channels[contents.main]
+    off = f"{number(quoted(channel).before if here is None else here)} {channel.unit} off"
+    return f"the {channel_words(contents.main)} is {off}{f', {said}' if said else ''}"
 
 
-def _size_words(size: Size, how: _SizeWords = "both") -> str:
+def _size_words(size: Size, how: _Sizes) -> str:
     """`6 % of the weight or 0.060 m after 0.5 s simulated`, or one of the two, or neither."""
     metres = metres_words(size) if how in ("both", "metres") else ""
     share = share_words(size) if how in ("both", "share") or (how == "metres" and not metres) else ""
     return " or ".join(filter(None, (share, metres)))
 
 
-def _better_in_short(main: str, channels: Mapping[str, Channel], overall: bool = False) -> str:
-    errors = quoted(channels[main]) if main else None
-    if errors is None or errors.before is None or errors.named is None:
+def _better_in_short(channel: Channel, overall: bool) -> str:
+    errors = quoted(channel)
+    if errors.before is None or errors.named is None:
         return ""
-    unit, floor = channels[main].unit, number(channels[main].noise_floor)
+    named = f"{number(errors.named)} {channel.unit}"
     if errors.named >= errors.before:
-        return f"; the error is not smaller with this ({number(errors.named)} {unit})"
+        return f"; the error is not smaller with this ({named})"
     falls = f"overall the error falls from {number(errors.before)}" if overall else "the error falls"
-    return f"; {falls} to {number(errors.named)} {unit} (noise {floor})"
+    return f"; {falls} to {named} (noise {number(channel.noise_floor)})"
 
 
 def warnings_of(channels: Mapping[str, Channel]) -> list[str]:
@@ -346,17 +345,16 @@ def surest_location(here: Sequence[Location]) -> Location:
     return min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)
 
 
-def _places(main: str, contents: Contents) -> tuple[str, str, str, str, str, str]:
+def _places(contents: Contents) -> tuple[str, str, str, str, str, str]:
     """Where and how much the main channel is off, from all that can be said to the least.
 
     With regime, size and significance; without the significance; with the metres alone; the same two without regime;
     and the error alone. With a regime or time all sizes are those of this place.
     """
-    analysis, channels = contents.analysis, contents.channels
-    size = main_size(analysis, main, channels)
-    both, metres, plain = (_off_words(main, channels, size, how) for how in ("both", "metres", ""))
-    here = [loc for loc in contents.locations if loc.channel == main]
-    if not main or not here:
+    analysis, size = contents.analysis, contents.main_size
+    both, metres, plain = (_off_words(contents, size, how) for how in ("both", "metres", ""))
+    here = [loc for loc in contents.locations if loc.channel == contents.main]
+    if not contents.main or not here:
         return both, both, metres, both, metres, plain
     best = surest_location(here)
     doubt = f" ({sure(best.p_value)})" if best.p_value is not None and best.p_value < _WORTH_SAYING_P else ""
@@ -364,7 +362,7 @@ def _places(main: str, contents: Contents) -> tuple[str, str, str, str, str, str
     there = size_at(analysis, best) if when else None
     if there is None:
         return f"{both}{doubt}", both, metres, both, metres, plain
-    said, short = (f"{when}{_off_words(main, channels, there, how, there.rms)}" for how in ("both", "metres"))
+    said, short = (f"{when}{_off_words(contents, there, how, there.rms)}" for how in ("both", "metres"))
     return f"{said}{doubt}", said, short, both, metres, plain
 
 
@@ -373,7 +371,7 @@ def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:
     regime = best.regime
     if in_a_regime(best):
         name, unit = regime_words(regime.variable, regime.either_sign)
-        space = f" {unit}" if unit else ""
+        low, high = (with_unit(number(end), unit) for end in (regime.low, regime.high))
         known = [r for r in analysis.regimes.values() if regime.variable in r]
         flown = np.concatenate([regime_values(r, regime) for r in known])
         to_the_end = regime.high >= np.nanquantile(flown, 0.98)
@@ -382,11 +380,10 @@ def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:
             return ""
         if from_the_start:
             # "Up to −1.3 m/s of forward speed" nobody reads as flying backwards.
-            below = f"where the {name} is below {number(regime.high)}{space}, "
-            return below if regime.high < 0 else f"up to {number(regime.high)}{space} of {name}, "
+            return f"where the {name} is below {high}, " if regime.high < 0 else f"up to {high} of {name}, "
         if to_the_end:
-            return f"from {number(regime.low)}{space} of {name} on, "
-        return f"between {number(regime.low)} and {number(regime.high)}{space} of {name}, "
+            return f"from {low} of {name} on, "
+        return f"between {number(regime.low)} and {high} of {name}, "
     if best.energy_share < 0.99 and best.start_s is not None and best.stop_s is not None:
         more = f" (and in {len(here) - 1} more stretches)" if len(here) > 1 else ""
         return f"from {best.start_s:.1f} to {best.stop_s:.1f} s of {best.run}{more}, "
@@ -394,11 +391,8 @@ def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:
 
 
 def _parameters(finding: Finding) -> str:
-    shown = [
-        f"{e.symbol} = {plus_minus(e.value, e.low, e.high)}{' ' + e.unit if e.unit not in ('', '-', '1') else ''}"
-        for e in surest(finding.parameters)
-    ]
-    return listed(shown)
+    estimates = surest(finding.parameters)
+    return listed([f"{e.symbol} = {with_unit(plus_minus(e.value, e.low, e.high), e.unit)}" for e in estimates])
 
 
 def surest(parameters: Sequence[Estimate]) -> list[Estimate]:
@@ -428,9 +422,9 @@ def _left_out(finding: Finding, share: float | None) -> str:
 
 
 def _either(finding: Finding, analysis: Analysis) -> str:
-    names = [effect_words(i) for i in dict.fromkeys((finding.id, *finding.alternatives))]
-    either, question = ("Either ", "show which") if len(names) > 1 else ("", "settle it")
-    text = f"{either}{listed(names, 'or')} was left out"
+    members = dict.fromkeys((finding.id, *finding.alternatives))
+    either, question = ("Either ", "show which") if len(members) > 1 else ("", "settle it")
+    text = f"{either}{names_of(members, 'or')} was left out"
     text += "" if finding.probability is None else f" (probability {percent(finding.probability)})"
     text += f"; this recording cannot {question}"
     # The next experiment is made for one class; it need not help with another.
@@ -442,24 +436,19 @@ def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequen
     """A wrong value, or with `why` one that is only suggested."""
     believed, refitted, low, high = values
     words, unit = parameter_words(name)
-    space = f" {unit}" if unit else ""
+    value, before = with_unit(plus_minus(refitted, low, high), unit), with_unit(number(believed, 4), unit)
     if not np.isfinite(believed):
-        return f"The {words} is {plus_minus(refitted, low, high)}{space}; nothing was believed about it."
+        return f"The {words} is {value}; nothing was believed about it."
+    if why:
+        return f"The {words} is suggested to be {value} ({before} believed), not established: {why}."
     # Of a ratio that alone is known the least trusted value is called wrong; the reader may know better.
     other = f" (or, what explains as much here: {listed(list(instead), 'or')})" if instead else ""
-    value = plus_minus(refitted, low, high)
-    if why:
-        believed_words = f"{number(believed, 4)}{space} believed"
-        return f"The {words} is suggested to be {value}{space} ({believed_words}), not established: {why}."
-    return f"The {words} is {value}{space}, not the {number(believed, 4)}{space} believed{other}."
+    return f"The {words} is {value}, not the {before} believed{other}."
 
 
-def _better(main: str, channels: Mapping[str, Channel], corrected: Sequence[str]) -> str:
-    if not main:
-        return ""
-    channel = channels[main]
+def _better(name: str, channel: Channel, corrected: Sequence[str]) -> str:
     errors, unit = quoted(channel), channel.unit
-    error = f"error of the {channel_words(main)} {_said_of(channel)}"
+    error = f"error of the {channel_words(name)} {_said_of(channel)}"
     before, after, noise = map(number, (errors.before, errors.named, channel.noise_floor))
     if errors.before is not None and errors.named is not None and errors.named >= errors.before:
         return f"The {error} is not smaller with this: {before} before, {after} {unit} after."

@@ -4,29 +4,22 @@ derivatives → noise), and three tiles below its sentence.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
 from rotorid.effects.catalogue import before_the_rotors, catalogue
-from rotorid.effects.contract import Motion
 from rotorid.mismatch.decide.status import CLAIMED
-from rotorid.mismatch.decide.words import (
-    capital,
-    channel_words,
-    effect_words,
-    listed,
-    number,
-    parameter_words,
-    regime_words,
-)
+from rotorid.mismatch.decide.words import capital, channel_words, effect_words, listed, number, parameter_words
 from rotorid.mismatch.tell.consistency import quoted
-from rotorid.mismatch.tell.sentences import MOST_NAMES, surest_location
-from rotorid.mismatch.tell.verdict import Channel, EffectVerdict, Errors, Location, Verdict
+from rotorid.mismatch.tell.places import range_words
+from rotorid.mismatch.tell.sentences import MOST_NAMES, names_of, surest_location
+from rotorid.mismatch.tell.verdict import Channel, Location, Verdict
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES
+from rotorid.vehicle.simulator import at_rest
 
 _SWING = {**dict.fromkeys("uvw", 5.0), **dict.fromkeys("pqr", 2.0)}
 """Of each quantity, m/s and rad/s, how far a catalogue form is moved to see what it makes of it."""
@@ -75,19 +68,11 @@ def steps_sentence(verdict: Verdict) -> str:
     # The geometric mean: one channel may lose nearly all of its error and another none.
     errors = f"errors of the {len(compared)} forces and moments on average" if len(compared) > 1 else "error"
     held = any(c.rmse.held_out.after is not None for c in verdict.channels.values())
-    claimed = {
-        e.id: listed([effect_words(i) for i in dict.fromkeys((e.id, *e.alternatives))], "or")
-        for e in verdict.effects
-        if e.delivered
-    }
+    claimed = {e.id: names_of((e.id, *e.alternatives), "or") for e in verdict.effects if e.delivered}
     values = min(whole.values, 1.0)  # values alone that do not help take nothing off
-    verb = "takes" if len(claimed) < 2 else "take"
-    taken = [
-        ("values", 1.0 - values, "take"),
-        (_named(claimed.values()) or "named physics", values - whole.named, verb),
-    ]
+    named, take = _counted(list(claimed.values())) or "named physics", "takes" if len(claimed) < 2 else "take"
     parts: list[str] = []
-    for name, share, verb in taken:
+    for name, verb, share in (("values", "take", 1.0 - values), (named, take, values - whole.named)):
         if share >= worth_saying:
             what = f"{100 * share:.0f} %"
             parts.append(f"{name} another {what}" if parts else f"{name} {verb} {what} off the {errors}")
@@ -110,13 +95,12 @@ def _nameless(verdict: Verdict, claimed: Mapping[str, str]) -> str:
     measured = any(name.startswith("rotor_speed") for name in verdict.channels)
     path = [words for i, words in claimed.items() if i in before_the_rotors()]
     if path and not measured and verdict.delivered.model == "refitted":
-        return f": {_named(path)}, and what has no name yet"  # refitted values fly behind the path that was found
+        return f": {_counted(path)}, and what has no name yet"  # refitted values fly behind the path that was found
     return " and has no name yet"
 
 
-def _named(words: Iterable[str]) -> str:
+def _counted(names: list[str]) -> str:
     """The first of some names and how many more there are."""
-    names = list(words)
     return listed(names if len(names) <= MOST_NAMES else [*names[: MOST_NAMES - 1], f"{len(names) - 1} more effects"])
 
 
@@ -147,26 +131,12 @@ def _moved_by() -> dict[str, frozenset[tuple[str, str]]]:
     for k, q in enumerate(quantities):
         for row, sign in ((1 + 2 * k, 1.0), (2 + 2 * k, -1.0)):
             (velocity if q in "uvw" else rates)[row, k % 3] = sign * _SWING[q]
-    speed = np.full((n, 4), np.sqrt(9.81 / 4e-5))
-    motion = Motion(
-        time_s=0.01 * np.arange(n),
-        rotor_speed=speed,
-        rotor_acceleration=np.zeros((n, 4)),
-        angular_velocity=rates,
-        angular_acceleration=np.zeros((n, 3)),
-        specific_force=np.tile([0.0, 0.0, -9.81], (n, 1)),
-        rotation=np.tile(np.eye(3), (n, 1, 1)),
-        velocity=velocity,
-        position=np.zeros((n, 3)),
-        height=np.ones(n),
-        voltage=np.ones(n),
-    )
+    hovering = at_rest(vehicle, 0.01 * np.arange(n), np.full((n, 4), np.sqrt(9.81 / 4e-5)), height_m=1.0)
+    motion = replace(hovering, velocity=velocity, angular_velocity=rates, voltage=np.ones(n))
     out = {}
     for effect_id, effect in catalogue().items():
-        found = set()
-        for form in (
-            effect.forms(vehicle) if effect.fitted and effect.kind == "physics" and not effect.of_the_rig else ()
-        ):
+        found, moving = set(), effect.fitted and effect.kind == "physics" and not effect.of_the_rig
+        for form in effect.forms(vehicle) if moving else ():
             if form.memory or form.on_loading:
                 continue
             values = np.array([p.starts[0] if p.starts else 1.0 for p in form.parameters])
@@ -174,12 +144,9 @@ def _moved_by() -> dict[str, frozenset[tuple[str, str]]]:
             parts = [np.zeros((n, 3)) if x is None else np.nan_to_num(x) for x in (added.force, added.moment)]
             table = np.concatenate(parts, axis=1)
             largest = np.abs(table).max(axis=0) + 1e-30
-            for k, q in enumerate(quantities):
-                odd = np.abs(table[1 + 2 * k] - table[2 + 2 * k]) / largest
-                found |= {(c, q) for c, size in zip(CHANNELS, odd, strict=True) if size > 0.05}
-            found |= {
-                (c, "constant") for c, size in zip(CHANNELS, np.abs(table[0]) / largest, strict=True) if size > 0.05
-            }
+            made = {q: table[1 + 2 * k] - table[2 + 2 * k] for k, q in enumerate(quantities)} | {"constant": table[0]}
+            for q, row in made.items():
+                found |= {(c, q) for c, size in zip(CHANNELS, np.abs(row) / largest, strict=True) if size > 0.05}
         out[effect_id] = frozenset(found)
     return out
 
@@ -199,11 +166,6 @@ class _Tile:
     small: str = ""
 
 
-def errors_of(channel: Channel) -> tuple[Errors, str]:
-    """Errors to quote and where they were made: on runs held out where there are any."""
-    return quoted(channel), "on the runs fitted" if channel.rmse.held_out.after is None else "on runs held out"
-
-
 def claims(verdict: Verdict) -> list[str]:
     """What is claimed, in words that fit before "left out": effects, a class as "a or b", each once."""
     said, seen = [], set()
@@ -211,17 +173,10 @@ def claims(verdict: Verdict) -> list[str]:
         members = {effect.id, *effect.alternatives}
         if effect.status in CLAIMED and not members & seen:
             seen |= members
-            said.append(_name(effect))
+            others = [effect_words(i) for i in effect.alternatives if i != effect.id and effect.status == "ambiguous"]
+            others = others if len(others) < 2 else [f"one of {len(others)} others"]
+            said.append(" or ".join([effect_words(effect.id), *others]))
     return said
-
-
-def _name(effect: EffectVerdict) -> str:
-    others = [i for i in effect.alternatives if i != effect.id]
-    if effect.status != "ambiguous" or not others:
-        return effect_words(effect.id)
-    if len(others) == 1:
-        return f"{effect_words(effect.id)} or {effect_words(others[0])}"
-    return f"{effect_words(effect.id)} or one of {len(others)} others"
 
 
 def tiles(verdict: Verdict, main: str) -> list[_Tile]:
@@ -254,8 +209,7 @@ def _where(verdict: Verdict, main: str) -> _Tile:
 def _when(best: Location, here: Sequence[Location]) -> str:
     regime = best.regime
     if regime is not None and regime.low is not None and regime.high is not None:
-        name, unit = regime_words(regime.variable, regime.either_sign)
-        return f"{name} {number(regime.low)} to {number(regime.high)} {unit}".strip()
+        return range_words(regime)
     if best.energy_share < 0.99 and best.start_s is not None and best.stop_s is not None:
         more = f" and {len(here) - 1} more stretches" if len(here) > 1 else ""
         return f"{best.start_s:.1f} to {best.stop_s:.1f} s of {best.run}{more}"
@@ -266,7 +220,8 @@ def _how_much(verdict: Verdict, main: str) -> _Tile:
     if main not in verdict.channels:
         return _Tile("How much", "–")
     channel = verdict.channels[main]
-    errors, where = errors_of(channel)
+    errors = quoted(channel)
+    where = "on the runs fitted" if channel.rmse.held_out.after is None else "on runs held out"
     large = f"{number(errors.before)} → {number(errors.after)} {channel.unit}"
     size = verdict.size
     metres = size.metres_after_half_a_second if size is not None and size.channel == main else None

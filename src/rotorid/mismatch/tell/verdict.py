@@ -10,46 +10,30 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from rotorid.io.text.writing import rounded
-from rotorid.mismatch.decide.findings import (
-    Analysis,
-    ChannelTrace,
-    Finding,
-    ValueRow,
-    by_channel,
-    rms,
-)
+from rotorid.mismatch.decide.findings import Analysis, Finding, by_channel, rms
 from rotorid.mismatch.decide.sizes import Size, fitted_part, scales
 from rotorid.mismatch.decide.status import Estimate
-from rotorid.mismatch.tell.consistency import (
-    VerdictWord,
-    by_share,
-    located_channels,
-    missing_places,
-    share_left,
-    verdict_word,
-)
+from rotorid.mismatch.tell.consistency import VerdictWord, by_share, missing_places, share_left, verdict_word
 from rotorid.mismatch.tell.sentences import (
     Contents,
     details,
     first_words,
     headline,
     main_channel,
-    main_size,
     spoken,
     warnings_of,
 )
 from rotorid.recordings import RecordingSet
 from rotorid.recordings.check import doubts_of
-from rotorid.recordings.run import Doubt
 from rotorid.recordings.sufficient import basis_of
 
 __all__ = ["Verdict", "main_channel", "make_verdict", "spoken"]
@@ -81,6 +65,11 @@ class _KeysOfVerdict(BaseModel):
     """A group of keys of the verdict: none unknown, none missing."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @classmethod
+    def filled(cls, *values: object) -> Self:
+        """Filled in the order of its keys."""
+        return cls(**dict(zip(cls.model_fields, values, strict=True)))
 
 
 class Runs(_KeysOfVerdict):
@@ -355,22 +344,24 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
 
     Its word, the share left and the shares of the effects follow from the errors that it prints.
     """
-    inverse = _inverse_channels(analysis)
-    locations = _with_missing_places(analysis, locations, inverse)
-    located = located_channels(locations, inverse)
-    left = share_left(inverse, located, _fewest(analysis))
-    shares = analysis.shares
-    word: VerdictWord = "not_judged" if _stopping(analysis) else verdict_word(analysis, locations, left, inverse)
-    contents = Contents(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
+    inverse, samples = _inverse_channels(analysis)
+    locations = [*locations, *_missing_locations(analysis, locations, inverse, samples)]
+    left, shares, basis = share_left(inverse, locations, samples), analysis.shares, basis_of(analysis.recordings)
+    stopped, wrong = any(d.stops for d in analysis.doubts), analysis.values.keys()
+    word: VerdictWord = "not_judged" if stopped else verdict_word(analysis, locations, left, inverse)
+    main = main_channel(analysis, locations, inverse)
+    contents = Contents(analysis, word, locations, inverse, main, left if word != "no_mismatch" else 0.0, forward)
     return Verdict(
         set=analysis.recordings.name,
         kind=analysis.recordings.vehicle.kind,
         runs=Runs(training=analysis.split.training, held_out=analysis.split.held_out),
         verdict=word,
-        basis=_basis_of_verdict(analysis),
+        basis=BasisOfVerdict.filled(
+            basis.sentence, basis.recorded_s, basis.in_the_air_s, basis.ground_share, basis.missing
+        ),
         doubts=tuple(DoubtOfSet.model_validate(d, from_attributes=True) for d in analysis.doubts),
         sentence=spoken(headline(contents), analysis),
-        size=_size_of(main_size(analysis, main_channel(analysis, locations, inverse), inverse)),
+        size=_size_of(contents.main_size),
         details=tuple(spoken(text, analysis) for text in details(contents)),
         warnings=tuple(spoken(text, analysis) for text in warnings_of({**inverse, **forward})),
         channels=inverse | dict(forward),
@@ -379,50 +370,36 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
             effect_verdict(f, shares.get(f.id), analysis.effect_sizes.get(f.id))
             for f in by_share(analysis.findings, shares)
         ),
-        delivered=_delivered_of(analysis),
-        derivatives=tuple(DerivativeOf(**d.model_dump()) for d in analysis.improved.derivatives),
-        absent=tuple(
-            Absent(id=a.id, symbol=a.symbol, at_most=a.at_most, unit=a.unit, share_of_weight=a.share or None)
-            for a in analysis.absent
+        delivered=Delivered(
+            model=analysis.delivery.model,
+            derivatives=analysis.delivery.derivatives,
+            scores=tuple(Score.filled(*score) for score in analysis.delivery.scores),
         ),
+        derivatives=tuple(DerivativeOf(**d.model_dump()) for d in analysis.improved.derivatives),
+        absent=tuple(Absent.filled(a.id, a.symbol, a.at_most, a.unit, a.share or None) for a in analysis.absent),
         parameters={
-            name: WrongValue(believed=believed, refitted=refitted, interval_95=(low, high))
-            for name, (believed, refitted, low, high) in analysis.values.items()
+            name: WrongValue.filled(believed, refitted, interval)
+            for name, (believed, refitted, *interval) in analysis.values.items()
         },
-        believed_values={row.name: _believed_value_of(row, analysis) for row in analysis.believed_values},
-        correlations=tuple(Correlated(values=pair, correlation=r) for pair, r in analysis.value_correlations.items()),
+        believed_values={
+            r.name: BelievedValue.filled(r.believed, r.estimate, (r.low, r.high), r.delivered, r.name in wrong)
+            for r in analysis.believed_values
+        },
+        correlations=tuple(Correlated.filled(*row) for row in analysis.value_correlations.items()),
         command_path=_estimates(analysis.command_path),
-        not_testable=tuple(NotTestable(id=i, reason=r) for i, r in sorted(analysis.not_testable.items())),
+        not_testable=tuple(NotTestable.filled(*row) for row in sorted(analysis.not_testable.items())),
         unexplained=Unexplained(
             share=float(np.clip(contents.left, 0.0, 1.0)),
             channels=analysis.unexplained_channels,
             depends_on=analysis.unexplained_depends_on,
             description=analysis.unexplained_description,
         ),
-        next_experiment=NextExperiment(
-            manoeuvre=analysis.next_manoeuvre,
-            separates=analysis.next_separates,
-            predicted_separation_sigma=None,
-        ),
+        next_experiment=NextExperiment.filled(analysis.next_manoeuvre, analysis.next_separates, None),
     )
 
 
 def _estimates(numbers: Sequence[Estimate]) -> tuple[ParameterEstimate, ...]:
-    return tuple(
-        ParameterEstimate(symbol=e.symbol, value=e.value, unit=e.unit, interval_95=(e.low, e.high)) for e in numbers
-    )
-
-
-def _basis_of_verdict(analysis: Analysis) -> BasisOfVerdict:
-    """Time and columns of the recordings as analysed."""
-    found = basis_of(analysis.recordings)
-    return BasisOfVerdict(
-        sentence=found.sentence,
-        recorded_s=found.recorded_s,
-        in_the_air_s=found.in_the_air_s,
-        ground_share=found.ground_share,
-        not_recorded=found.missing,
-    )
+    return tuple(ParameterEstimate.filled(e.symbol, e.value, e.unit, (e.low, e.high)) for e in numbers)
 
 
 def _size_of(size: Size | None) -> SizeOfError | None:
@@ -439,72 +416,52 @@ def _size_of(size: Size | None) -> SizeOfError | None:
     )
 
 
-def _believed_value_of(row: ValueRow, analysis: Analysis) -> BelievedValue:
-    """One row of the table of all believed values."""
-    return BelievedValue(
-        believed=row.believed,
-        estimate=row.estimate,
-        interval_95=(row.low, row.high),
-        delivered=row.delivered,
-        wrong=row.name in analysis.values,
-    )
-
-
-def _delivered_of(analysis: Analysis) -> Delivered:
-    """Which candidate is taken home, and every candidate's number."""
-    rows = (dict(zip(Score.model_fields, score, strict=True)) for score in analysis.delivery.scores)
-    scores = tuple(Score.model_validate(row) for row in rows)
-    return Delivered(model=analysis.delivery.model, derivatives=analysis.delivery.derivatives, scores=scores)
-
-
-def _with_missing_places(
-    analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel]
-) -> list[Location]:
-    """Locations, and those that the rest of the verdict speaks of and nothing located."""
-    out = list(locations)
-    for channel, p_value in missing_places(analysis, locations, channels, _fewest(analysis)):
+def _missing_locations(
+    analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel], samples: Mapping[str, int]
+) -> Iterator[Location]:
+    """Whole runs of the channels that the rest of the verdict speaks of and nothing located."""
+    for channel, p_value in missing_places(analysis, locations, channels, samples):
         traces = [t for t in analysis.traces if t.channel == channel and len(t.time_s)]
         for run in dict.fromkeys(t.run for t in traces):
             own = [t for t in traces if t.run == run]
-            out.append(
-                Location(
-                    run=run,
-                    channel=channel,
-                    start_s=float(own[0].time_s[0]),
-                    stop_s=float(own[-1].time_s[-1]),
-                    p_value=p_value,
-                    energy_share=1.0,
-                    regime=None,
-                )
-            )
-    return out
+            start_s, stop_s = float(own[0].time_s[0]), float(own[-1].time_s[-1])
+            yield Location.filled(run, channel, start_s, stop_s, p_value, 1.0, None)
 
 
-def _fewest(analysis: Analysis) -> dict[str, int]:
-    """To each channel how many of its samples are fitted or held out, the fewer of both."""
-    out, part = {}, fitted_part(analysis)
+def _inverse_channels(analysis: Analysis) -> tuple[dict[str, Channel], dict[str, int]]:
+    """Errors of every channel that the traces hold, by inverse dynamics.
+
+    And of how many samples: of those fitted and those held out the fewer.
+    """
+    found, samples, part = {}, {}, fitted_part(analysis)
     for channel, traces in by_channel(analysis.traces).items():
-        signs = np.concatenate([part(t.run, t.time_s) for t in traces])
-        out[channel] = max(min(int((signs > 0).sum()), int((signs < 0).sum())), 1)
-    return out
-
-
-def _inverse_channels(analysis: Analysis) -> dict[str, Channel]:
-    """Errors of every channel that the traces hold, by inverse dynamics."""
-    found, part = {}, fitted_part(analysis)
-    for channel, traces in by_channel(analysis.traces).items():
-        before, after = analysis.p_values.get(channel, (None, None))
         signs = [part(t.run, t.time_s) for t in traces]
-        rmse = SplitErrors(
-            training=_errors(traces, [s > 0 for s in signs]), held_out=_errors(traces, [s < 0 for s in signs])
+        fitted, held_out = (
+            {
+                stage: rms([getattr(t, stage)[sign * s > 0] for t, s in zip(traces, signs, strict=True)])
+                for stage in Errors.model_fields
+            }
+            for sign in (1, -1)
         )
-        found[channel] = Channel(
-            unit=traces[0].unit,
-            noise_floor=reached(analysis.noise_floor.get(channel), rmse.held_out),
-            rmse=rmse,
-            p_value=PValues(before=before, after=after),
-        )
-    return found
+        floor, p_values = analysis.noise_floor.get(channel), analysis.p_values.get(channel, (None, None))
+        found[channel] = channel_of(traces[0].unit, floor, fitted, held_out, *p_values)
+        counts = [sum(int((sign * s > 0).sum()) for s in signs) for sign in (1, -1)]
+        samples[channel] = max(min(counts), 1)
+    return found, samples
+
+
+def channel_of(
+    unit: str,
+    floor: float | None,
+    fitted: Mapping[str, float | None],
+    held_out: Mapping[str, float | None],
+    before: float | None = None,
+    after: float | None = None,
+) -> Channel:
+    """A channel's errors by stage on the runs fitted and held out, and p-values before and after."""
+    rmse = SplitErrors(training=Errors(**fitted), held_out=Errors(**held_out))
+    p_value = PValues(before=before, after=after)
+    return Channel(unit=unit, noise_floor=reached(floor, rmse.held_out), rmse=rmse, p_value=p_value)
 
 
 def reached(floor: float | None, held_out: Errors) -> float | None:
@@ -515,11 +472,6 @@ def reached(floor: float | None, held_out: Errors) -> float | None:
     """
     errors = [e for e in held_out.model_dump().values() if e is not None]
     return None if floor is None else min([floor, *errors])
-
-
-def _errors(traces: Sequence[ChannelTrace], masks: Sequence[np.ndarray]) -> Errors:
-    own = list(zip(traces, masks, strict=True))
-    return Errors(**{stage: rms([getattr(t, stage)[mask] for t, mask in own]) for stage in Errors.model_fields})
 
 
 def effect_verdict(finding: Finding, share: float | None, size: Size | None = None) -> EffectVerdict:
@@ -538,17 +490,8 @@ def effect_verdict(finding: Finding, share: float | None, size: Size | None = No
         parameters=_estimates(finding.parameters),
         probability=finding.probability,
         p_value=finding.p_value,
-        held_out_gain=None
-        if finding.gain is None
-        else Gain(rmse_ratio=finding.gain[0], interval_95=(finding.gain[1], finding.gain[2])),
+        held_out_gain=None if finding.gain is None else Gain.filled(finding.gain[0], finding.gain[1:]),
     )
-
-
-if __name__ == "__main__":
-    if "--write-schema" in sys.argv:
-        SCHEMA_PATH.write_text(schema_text())
-    else:
-        print(schema_text(), end="")
 
 
 def with_doubts(analysis: Analysis, recordings: RecordingSet) -> Analysis:
@@ -560,12 +503,18 @@ def with_doubts(analysis: Analysis, recordings: RecordingSet) -> Analysis:
     # Share of the weight, or of the moment that the rotors can make, that may stay off in a channel where a mistake in
     # the set counts as corrected: of wrong corrections seen a quarter to a half stayed, of right ones next to nothing.
     described = 0.1
-    found = doubts_of(recordings)
-    left = found
+    found = left = doubts_of(recordings)
     if any(d.stops for d in found) and _still_off(analysis) < described:
-        left = doubts_of(replace(analysis.recordings, vehicle=corrected(analysis)))
+        # Mistakes undone and wrong values at their numbers, without effects.
+        vehicle = analysis.improved.model_copy(update={"effects": (), "derivatives": ()})
+        left = doubts_of(replace(analysis.recordings, vehicle=vehicle))
     standing = {d.what for d in left}
-    said = tuple(d if d.what in standing or not d.stops else _as_corrected(d) for d in found)
+    said = [
+        d
+        if d.what in standing or not d.stops
+        else replace(d, sentence=f"{d.sentence} The analysis found and corrected this.", stops=False)
+        for d in found
+    ]
     return replace(analysis, doubts=tuple(dict.fromkeys((*said, *recordings.proposed, *analysis.recordings.proposed))))
 
 
@@ -578,16 +527,8 @@ def _still_off(analysis: Analysis) -> float:
     return max(off)
 
 
-def corrected(analysis: Analysis):
-    """The vehicle as the analysis has it: mistakes undone and wrong values at their numbers, without effects."""
-    return analysis.improved.model_copy(update={"effects": (), "derivatives": ()})
-
-
-def _as_corrected(doubt: Doubt) -> Doubt:
-    """A doubt that no longer stands in the way."""
-    return replace(doubt, sentence=f"{doubt.sentence} The analysis found and corrected this.", stops=False)
-
-
-def _stopping(analysis: Analysis) -> tuple[Doubt, ...]:
-    """Doubts because of which the set is not judged."""
-    return tuple(d for d in analysis.doubts if d.stops)
+if __name__ == "__main__":
+    if "--write-schema" in sys.argv:
+        SCHEMA_PATH.write_text(schema_text())
+    else:
+        print(schema_text(), end="")

@@ -9,7 +9,7 @@ import json
 import math
 import re
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -21,7 +21,8 @@ from markupsafe import Markup
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.describe import advice
-from rotorid.mismatch.decide.findings import Analysis, Finding
+from rotorid.mismatch.decide.findings import Analysis
+from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.mismatch.decide.words import (
     FORWARD_WORDS,
     capital,
@@ -37,8 +38,11 @@ from rotorid.mismatch.decide.words import (
     sure,
 )
 from rotorid.mismatch.deliver.files import form_of
-from rotorid.mismatch.tell.steps import errors_of, steps_of, tiles, together, would_explain
-from rotorid.mismatch.tell.verdict import Absent, Channel, EffectVerdict, Location, Verdict, main_channel, spoken
+from rotorid.mismatch.tell.consistency import quoted
+from rotorid.mismatch.tell.places import range_words
+from rotorid.mismatch.tell.sentences import names_of, with_unit
+from rotorid.mismatch.tell.steps import steps_of, tiles, together, would_explain
+from rotorid.mismatch.tell.verdict import Channel, EffectVerdict, Location, Verdict, main_channel, spoken
 from rotorid.recordings import RecordingSet
 from rotorid.report.page.data import page_data
 from rotorid.report.page.strip import strip
@@ -74,100 +78,44 @@ def make_page(
 ) -> str:
     """The page's HTML. `ledger` holds the rules that decided something, each with a `sentence`."""
     main = main_channel(analysis, verdict.locations, verdict.channels)
-    environment = Environment(autoescape=True, trim_blocks=False)
-    environment.filters["exp"] = math.exp
-    environment.filters |= {"place": _place, "pretty": pretty, "subscripts": _subscripts, "listed": listed}
-    environment.filters |= {"unit": _unit_text, "number": number, "cell": _cell, "plus_minus": plus_minus}
-    environment.filters |= {"channel": channel_words, "value": parameter_words, "regime": regime_words}
-    environment.filters["effect"] = lambda id_: capital(effect_words(id_))
-    environment.globals["symbol_of"] = symbol_of
     data = page_data(analysis, verdict, main)
     data["regimes"]["first"] = _first_variable(verdict, main, data["regimes"]["variables"])
-    page = environment.from_string(page_file("page.html")).render(
+    page = filled(
+        "page.html",
+        ("uPlot.iife.min.js", "page.js"),
         v=verdict,
+        analysis=analysis,
+        main=main,
+        data=data,
         word=_WORDS[verdict.verdict],
-        next=next_text(verdict, analysis.recordings),
-        ledger=[_ledger_row(row) for row in ledger],
+        claimed=by_share([e for e in verdict.effects if e.status in CLAIMED]),
+        suggested=[e for e in verdict.effects if e.status == "suggested"],
+        ruled_out=[e for e in verdict.effects if e.status in ("absorbed", "not_established")],
+        # Those first whose interval leaves out nothing.
+        derivatives=sorted(verdict.derivatives, key=lambda d: not (d.interval_95[0] > 0 or d.interval_95[1] < 0)),
+        ledger=ledger,
         notes=_notes(analysis, forward_notes),
-        **_figures(data),
-        **_at_the_top(verdict, main),
-        **_what(verdict, analysis),
-        **_where(verdict, analysis),
-        **_better(verdict, data["fit_percent"]),
-        **_not_found(verdict),
     )
     return spoken(page, analysis)
 
 
-def _figures(data: Mapping) -> dict:
-    """What the figures are drawn from, and which of them there are."""
-    scripts = page_file("uPlot.iife.min.js"), page_file("page.js")
-    return {
-        "css": Markup(page_file("uPlot.min.css") + page_file("page.css")),
-        "policy": _policy_for(*scripts),
-        "library": Markup(scripts[0]),
-        "script": Markup(scripts[1]),
-        "data": _embedded(data),
-        "has_figure": bool(data["traces"]),
-        "has_regimes": bool(data["regimes"]["channels"]),
-        "has_replay": data["replay"] is not None,
-    }
+@cache
+def _environment() -> Environment:
+    """What the templates know: how numbers and names are set, and who writes the sentences of a section."""
+    made = Environment(autoescape=True)
+    made.filters |= {"place": _place, "pretty": pretty, "subscripts": _subscripts, "names": names_of, "exp": math.exp}
+    made.filters |= {"unit": _unit_text, "number": number, "cell": _cell, "plus_minus": plus_minus}
+    made.filters |= {"channel": channel_words, "value": parameter_words, "regime": regime_words}
+    made.filters |= {"effect": lambda id_: capital(effect_words(id_)), "sentence": _sentence, "embedded": _embedded}
+    sections = (_runs_text, _step_rows, _parameters, _effect_notes, _values, _where_text, _shown_locations)
+    sections += (_forward_text, _by_method, _bars, _rest_text, _ruled_out_text, _silent, _limit_bar, _ledger_row)
+    sections += (page_file, tiles, strip, next_text, symbol_of, would_explain, percent_words, with_unit)
+    made.globals |= {writer.__name__.removeprefix("_"): writer for writer in sections}
+    made.globals |= {"models": _MODELS, "quantities": _QUANTITY_WORDS}
+    return made
 
 
-def _at_the_top(verdict: Verdict, main: str) -> dict:
-    """The section above all others."""
-    return {"runs": _runs_text(verdict), "tiles": tiles(verdict, main), "steps": _step_rows(verdict)}
-
-
-def _what(verdict: Verdict, analysis: Analysis) -> dict:
-    """The section on what was left out, and the one on what is predictable without a name."""
-    claimed = by_share([e for e in verdict.effects if e.status in ("established", "ambiguous")])
-    suggested = [e for e in verdict.effects if e.status == "suggested"]
-    return {
-        "what_text": _what_text(verdict),
-        "effects": [_effect_block(e, _finding_of(e, analysis)) for e in claimed],
-        "suggested": [_effect_block(e, _finding_of(e, analysis)) for e in suggested],
-        "values": [_value_range(name, *v) for name, v in analysis.values.items()],
-        "correlated": _correlated_text(verdict),
-        # Those first whose interval leaves out nothing.
-        "derivatives": sorted(verdict.derivatives, key=lambda d: not (d.interval_95[0] > 0 or d.interval_95[1] < 0)),
-        "quantities": _QUANTITY_WORDS,
-        "causes": lambda d: [effect_words(i) for i in would_explain(d.channel, d.quantity, verdict)],
-    }
-
-
-def _where(verdict: Verdict, analysis: Analysis) -> dict:
-    """The section on where it shows."""
-    shown, more = _shown_locations(verdict.locations)
-    strip_of = strip(analysis, verdict)
-    return {"where_text": _where_text(verdict), "strip": strip_of, "locations": shown, "more_locations": more}
-
-
-def _better(verdict: Verdict, fit_percent: Mapping[str, tuple[float, float]]) -> dict:
-    """The section on how much better the improved vehicle is, and the one on what remains."""
-    return {
-        "models": _MODELS,
-        "better_text": _better_text(verdict),
-        "forward_text": _forward_text(verdict),
-        "table": _error_table(verdict.channels, fit_percent),
-        "rest": _rest_text(verdict),
-    }
-
-
-def _not_found(verdict: Verdict) -> dict:
-    """The section on what was ruled out."""
-    known = {row.id for row in (*verdict.effects, *verdict.not_testable, *verdict.absent)}
-    known |= {i for e in verdict.effects for i in e.alternatives}
-    flown = verdict.kind == "flight"
-    silent = [effect_words(i) for i, e in catalogue().items() if i not in known and not (flown and e.of_the_rig)]
-    return {
-        "ruled_out": [_ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
-        "silent": listed(silent),
-        "limits": [_limit_row(a) for a in verdict.absent],
-    }
-
-
-def _policy_for(*scripts: str) -> str:
+def _policy_for(scripts: Sequence[str]) -> str:
     """Content security policy under which these scripts alone run, nothing is fetched and nothing sent.
 
     Without scripts none runs.
@@ -180,16 +128,25 @@ def _policy_for(*scripts: str) -> str:
     )
 
 
-def filled(template: str, /, **values: object) -> str:
-    """A page without scripts: a template of the page's files with its values."""
-    environment = Environment(autoescape=True, trim_blocks=True)
-    return environment.from_string(page_file(template)).render(policy=_policy_for(), **values)
+def filled(template: str, scripts: Sequence[str] = (), /, **values: object) -> str:
+    """A page: a template of the page's files with its values; of scripts it runs these files alone."""
+    texts = [page_file(name) for name in scripts]
+    policy, scripts = _policy_for(texts), [Markup(text) for text in texts]
+    return _environment().from_string(page_file(template)).render(policy=policy, scripts=scripts, **values)
 
 
 def drawing(figure: Path) -> Markup:
     """An SVG file as it stands within a page."""
     text = figure.read_text(encoding="utf-8")
     return Markup(text[text.index("<svg") :])
+
+
+def drawn(draw: Callable[..., None], *what: object) -> Markup:
+    """A figure as SVG within a page; `draw` takes what is to be drawn, and the file's path."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "figure.svg"
+        draw(*what, path)
+        return drawing(path)
 
 
 def _embedded(data: Mapping) -> Markup:
@@ -200,31 +157,21 @@ def _embedded(data: Mapping) -> Markup:
 
 def by_share(effects: Sequence[EffectVerdict]) -> list[EffectVerdict]:
     """The effects with the largest share of the gain first; in their order where no share is stated."""
-    return sorted(effects, key=lambda e: -(getattr(e, "share", None) or 0.0))
+    return sorted(effects, key=lambda e: -(e.share or 0.0))
 
 
-def _limit_row(limit: Absent) -> dict[str, str]:
-    """A row of the table of what was not found; `bar` is a share of the scale from 0.001 % to 100 % of the weight."""
+def _limit_bar(share: float | None) -> str:
+    """A limit as a part of the scale from 0.001 % to 100 % of the weight, in percent."""
     limit_decades = 5.0  # Decades below the weight that the bars of the limits show.
-    share = limit.share_of_weight
-    decades = 0.0 if not share else float(np.clip(1.0 + np.log10(share) / limit_decades, 0.0, 1.0))
-    size = Markup("")
-    if limit.at_most is not None:
-        size = Markup("|{}| ≤ {}").format(
-            _subscripts(limit.symbol), pretty(f"{number(limit.at_most)} {limit.unit}".removesuffix(" 1").strip())
-        )
-    return {
-        "name": capital(effect_words(limit.id)),
-        "size": size,
-        "share": "" if not share else pretty(percent_words(share)),
-        "bar": f"{100 * decades:.0f}",
-    }
+    return f"{100 * (np.clip(1.0 + np.log10(share) / limit_decades, 0.0, 1.0) if share else 0.0):.0f}"
 
 
-def _finding_of(effect: EffectVerdict, analysis: Analysis) -> Finding:
-    """The finding behind an effect of the verdict."""
-    same = [f for f in analysis.findings if f.id == effect.id]
-    return next((f for f in same if f.status == effect.status), same[0])
+def _silent(verdict: Verdict) -> str:
+    """Names of the effects that a verdict says nothing of; what only a rig can have is not looked for in flights."""
+    known = {row.id for row in (*verdict.effects, *verdict.not_testable, *verdict.absent)}
+    known |= {i for e in verdict.effects for i in e.alternatives}
+    flown = verdict.kind == "flight"
+    return names_of(i for i, e in catalogue().items() if i not in known and not (flown and e.of_the_rig))
 
 
 def _first_variable(verdict: Verdict, main: str, known: Mapping[str, str]) -> str:
@@ -236,11 +183,14 @@ def _first_variable(verdict: Verdict, main: str, known: Mapping[str, str]) -> st
 
 def _ledger_row(row: Mapping) -> Markup:
     """A rule of the ledger: its name, what it decided on and its sentence, with its numbers."""
-    head = " ".join(str(row[k]) for k in ("rule", "on", "subject", "id") if row.get(k))
-    numbers = row.get("numbers") or {}
-    said = ", ".join(f"{k} {number(v, 3) if isinstance(v, float) else v}" for k, v in dict(numbers).items())
+    said = ", ".join(f"{k} {number(v, 3) if isinstance(v, float) else v}" for k, v in row["numbers"].items())
     tail = f" ({said})" if said else ""
-    return Markup("<strong>{}</strong> {}{}").format(head, pretty(str(row.get("sentence", ""))), tail)
+    return Markup("<strong>{} {}</strong> {}{}").format(row["rule"], row["on"], pretty(row["sentence"]), tail)
+
+
+def _sentence(text: str) -> str:
+    """A text as a sentence; nothing stays nothing."""
+    return capital(text).rstrip(".") + "." if text else ""
 
 
 def pretty(text: str) -> Markup:
@@ -284,40 +234,21 @@ def _where_text(verdict: Verdict) -> list[str]:
     for loc in verdict.locations:
         if loc.regime is not None:
             regimes.setdefault(loc.channel, loc.regime)
-    texts = []
-    for channel, regime in regimes.items():
-        name, unit = regime_words(regime.variable, regime.either_sign)
-        span = f"{number(regime.low)} to {number(regime.high)} {unit}".strip()
-        texts.append(f"{channel_words(channel)}: {name} {span}")
+    texts = [f"{channel_words(channel)}: {range_words(regime)}" for channel, regime in regimes.items()]
     channels = dict.fromkeys(loc.channel for loc in verdict.locations)
     first = f"The mismatch shows in {listed([channel_words(channel) for channel in channels])}."
     return [first] + ([pretty(f"What separates it best: {'; '.join(texts)}.")] if texts else [])
 
 
-def _shown_locations(locations: Sequence[Location]) -> tuple[list[Location], str]:
-    """The locations with most of the energy, in their order, and a word on the others."""
-    if len(locations) <= _MOST_LOCATIONS:
-        return list(locations), ""
+def _shown_locations(locations: Sequence[Location]) -> list[Location]:
+    """The locations with most of the energy, in their order."""
     kept = sorted(locations, key=lambda loc: -loc.energy_share)[:_MOST_LOCATIONS]
-    rest = len(locations) - _MOST_LOCATIONS
-    return [loc for loc in locations if loc in kept], f"{rest} more are in verdict.json."
+    return [loc for loc in locations if loc in kept]
 
 
-def _what_text(verdict: Verdict) -> list[str]:
-    at_work = [e for e in verdict.effects if e.status in ("established", "ambiguous")]
-    if at_work or verdict.parameters:
-        return []
-    if verdict.verdict == "no_mismatch":
-        return ["Nothing: the believed vehicle describes these recordings to within their noise."]
-    return ["None of the known effects explains what was located."]
-
-
-def _effect_block(e: EffectVerdict, finding: Finding) -> dict:
-    """One effect at work: name, equation, parameters on their plausible ranges, how sure, what else it could be."""
+def _effect_notes(e: EffectVerdict) -> list[str]:
+    """How sure an effect at work is, what else it could be, how much it does, and where it is published."""
     effect = catalogue().get(e.id)
-    share = getattr(e, "share", None)
-    form = form_of(finding)
-    bounds = {p.symbol: p for p in form.parameters} if form else {}
     notes = [capital(sure(e.p_value)) + "." if e.p_value is not None else ""]
     if e.probability is not None:
         notes = [f"Probability {percent(e.probability)}."]
@@ -332,10 +263,9 @@ def _effect_block(e: EffectVerdict, finding: Finding) -> dict:
             notes[0] += " It is larger with it: the fitted flights state this effect, the held-out ones contradict it."
         elif high is not None and high >= 1.0:
             notes[0] += " The held-out flights do not confirm it."
-    others = [effect_words(i) for i in e.alternatives if i != e.id]
-    if others:
+    if others := [i for i in e.alternatives if i != e.id]:
         notes.append(
-            f"It could as well be {listed(others, 'or')}: these recordings cannot distinguish them; the model holds "
+            f"It could as well be {names_of(others, 'or')}: these recordings cannot distinguish them; the model holds "
             f"{effect_words(e.id)} in the place of the class."
         )
     if e.size is not None and e.size.share is not None:
@@ -349,38 +279,27 @@ def _effect_block(e: EffectVerdict, finding: Finding) -> dict:
         notes.append(f"Not delivered: {e.withheld}.")
     elif effect is not None and effect.confusers:
         notes.append(
-            f"What is easily mistaken for it ({listed([effect_words(i) for i in effect.confusers])}) was tested "
+            f"What is easily mistaken for it ({names_of(effect.confusers)}) was tested "
             "jointly with it and does not explain these data as well."
         )
     if effect is not None and effect.source:
         notes.append(f"Source: {effect.source}.")
-    return {
-        "id": e.id,
-        "name": capital(effect_words(e.id)),
-        "status": e.status,
-        "sentence": capital(e.sentence).rstrip(".") + "." if e.sentence else "",
-        "equation": _subscripts(e.equation),
-        "parameters": [
-            _parameter_range(
-                p.symbol,
-                p.value,
-                p.unit,
-                *p.interval_95,
-                plausible=(bounds[p.symbol].low, bounds[p.symbol].high) if p.symbol in bounds else None,
-                meaning=bounds[p.symbol].meaning if p.symbol in bounds else "",
-            )
-            for p in e.parameters
-        ],
-        "notes": [n for n in notes if n],
-        "share": None if share is None else f"{100 * share:.0f} %",
-        "share_width": "" if share is None else f"{60 * min(max(share, 0.0), 1.0):.1f}%",
-    }
+    return [n for n in notes if n]
 
 
-def _parameter_range(symbol, value, unit, low, high, plausible=None, meaning="", believed=None) -> dict:
+def _parameters(e: EffectVerdict, analysis: Analysis) -> list[dict]:
+    """An effect's parameters on their plausible ranges."""
+    same = [f for f in analysis.findings if f.id == e.id]
+    form = form_of(next((f for f in same if f.status == e.status), same[0]))
+    bounds = {p.symbol: (p.meaning, (p.low, p.high)) for p in form.parameters} if form else {}
+    return [
+        _parameter_range(p.symbol, p.value, p.unit, *p.interval_95, *bounds.get(p.symbol, ())) for p in e.parameters
+    ]
+
+
+def _parameter_range(symbol, value, unit, low, high, meaning="", plausible=None, believed=None) -> dict:
     """A parameter with its interval and the range to draw it on: the physical bounds where they are finite."""
     text = plus_minus(value, low, high) if value is not None else "not determined"
-    unit = unit if unit not in ("-", "1") else ""
     known = all(x is not None and math.isfinite(x) for x in (value, low, high))
     scale = None
     if known and text != "not determined":
@@ -399,7 +318,7 @@ def _parameter_range(symbol, value, unit, low, high, plausible=None, meaning="",
     return {
         "symbol": symbol,
         "meaning": meaning,
-        "text": f"{text} {unit}".strip(),
+        "text": with_unit(text, unit),
         "value": value,
         "interval": (low, high),
         "scale": scale,
@@ -413,62 +332,26 @@ def _bounds(low: float, high: float) -> str:
     return f"to {number(high)}" if not math.isfinite(low) else f"{number(low)} to {number(high)}"
 
 
-def _value_range(name: str, believed: float, refitted: float, low: float, high: float) -> dict:
-    words, unit = parameter_words(name)
-    row = _parameter_range(words.rstrip(","), refitted, unit, low, high, believed=believed)
-    return row | {"meaning": pretty(f"believed {number(believed, 4)} {unit}".strip())}
+def _values(analysis: Analysis) -> list[dict]:
+    """The values to correct, next to what was believed."""
+    rows = []
+    for name, (believed, refitted, low, high) in analysis.values.items():
+        words, unit = parameter_words(name)
+        before = f"believed {with_unit(number(believed, 4), unit)}"
+        row = _parameter_range(words.rstrip(","), refitted, unit, low, high, believed=believed)
+        rows.append(row | {"meaning": pretty(before)})
+    return rows
 
 
-def _correlated_text(verdict: Verdict) -> list[str]:
-    """Sentences on the values of which little more than a ratio is known."""
-    texts = []
-    for pair in verdict.correlations:
-        first, second = (parameter_words(n)[0] for n in pair.values)
-        known = f"know little more than a ratio (correlation {pair.correlation:.3f})"
-        texts.append(pretty(f"Of {first} and {second} these recordings {known}."))
-    return texts
+def _by_method(channels: Mapping[str, Channel]) -> list[tuple[str, dict[str, Channel]]]:
+    """Channels by what they are compared by: inverse dynamics, or simulation run forward."""
+    groups: dict[str, dict[str, Channel]] = {"inverse dynamics": {}, "simulation run forward": {}}
+    for name, channel in channels.items():
+        groups["simulation run forward" if name in FORWARD_WORDS else "inverse dynamics"][name] = channel
+    return [(method, own) for method, own in groups.items() if own]
 
 
-def _better_text(verdict: Verdict) -> str:
-    if verdict.verdict == "no_mismatch":
-        return "There is nothing to gain that these recordings could show."
-    if verdict.kind != "flight":
-        return (
-            "“Refitted” has the same physics with its values re-estimated; “improved” adds the effects found. All "
-            "compare the reading with what load, rotor speeds and weight predict."
-        )
-    return (
-        "“Refitted” has the same physics with its values re-estimated; “improved” adds the effects found. Forces, "
-        "moments and rotor speeds compare inverse dynamics; the others compare simulation run forward for half a "
-        "second from the recorded state."
-    )
-
-
-def _error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float, float]]) -> list[dict]:
-    """Rows of errors, inverse dynamics and simulation run forward apart; `fits` in per cent, before and after."""
-    groups = []
-    for name, chosen in (
-        ("inverse dynamics", [c for c in channels if c not in FORWARD_WORDS]),
-        ("simulation run forward", [c for c in channels if c in FORWARD_WORDS]),
-    ):
-        rows = [
-            {
-                "name": channel_words(c).removesuffix(" after half a second"),
-                "unit": _unit_text(channels[c].unit),
-                "noise": _cell(channels[c].noise_floor),
-                "bars": _bars(channels[c]),
-                "fit": pretty(" → ".join(f"{v:.0f}" for v in fits[c])) if c in fits else "–",
-                "held_out": [_cell(getattr(channels[c].rmse.held_out, s)) for s in _STAGES],
-                "training": [_cell(getattr(channels[c].rmse.training, s)) for s in _STAGES],
-            }
-            for c in chosen
-        ]
-        if rows:
-            groups.append({"name": name, "rows": rows})
-    return groups
-
-
-_STAGES = ("before", "refitted", "named", "after")
+_AFTER = " after half a second"
 _MODELS = {"believed": "as believed", "refitted": "values refitted", "named": "values and named physics"}
 
 
@@ -508,7 +391,7 @@ _QUANTITY_WORDS = {
 def _bars(channel: Channel) -> Markup:
     """Errors as believed (open) and improved (full) next to the noise (line), on a logarithmic scale."""
     farthest = 100.0  # Error over noise at which the bar of the table of errors ends.
-    errors, _ = errors_of(channel)
+    errors = quoted(channel)
     if not channel.noise_floor or errors.before is None or errors.after is None:
         return Markup("")
 
@@ -534,19 +417,13 @@ def _bars(channel: Channel) -> Markup:
 def _forward_text(verdict: Verdict) -> list[str]:
     """The simulation run forward in words: how far it drifts off within half a second."""
     parts = []
-    for name, said in (("position", "the position"), ("velocity", "the velocity"), ("attitude", "the attitude"),
-                       ("angular_velocity", "the body rates")):  # fmt: skip
-        if name not in verdict.channels:
-            continue
-        channel = verdict.channels[name]
-        errors, _ = errors_of(channel)
+    for name in filter(verdict.channels.__contains__, FORWARD_WORDS):
+        channel, said = verdict.channels[name], FORWARD_WORDS[name].removesuffix(_AFTER)
+        errors = quoted(channel)
         if errors.before is not None and errors.after is not None:
-            parts.append(f"{said} {number(errors.after)} {channel.unit} (believed: {number(errors.before)})")
-    if not parts:
-        return []
-    return [
-        pretty(f"Started from a recorded state and run for half a second, the improved vehicle misses {listed(parts)}.")
-    ]
+            parts.append(f"the {said} {number(errors.after)} {channel.unit} (believed: {number(errors.before)})")
+    said = f"Started from a recorded state and run for half a second, the improved vehicle misses {listed(parts)}."
+    return [pretty(said)] if parts else []
 
 
 def _cell(value: float | None) -> str | Markup:
@@ -565,7 +442,7 @@ def _rest_text(verdict: Verdict) -> list[str]:
     return texts + ([pretty(rest.description)] if rest.description else [])
 
 
-def _ruled_out(e: EffectVerdict) -> Markup:
+def _ruled_out_text(e: EffectVerdict) -> Markup:
     name = effect_words(e.id)
     sentence = e.sentence or {"absorbed": "explained by the refitted values"}.get(e.status, "did not hold")
     if sentence.lower().startswith(name.lower()):
@@ -581,7 +458,7 @@ def next_text(verdict: Verdict, recordings: RecordingSet) -> str:
         wanted = [catalogue()[i] for e in open_questions for i in (e.id, *e.alternatives) if i in catalogue()]
         flown = next((advice(w, recordings) for w in wanted if w.separating_manoeuvre), "")
         if flown:
-            return f"{capital(flown).rstrip('.')}. It bears on {listed([effect_words(e.id) for e in open_questions])}."
+            return f"{_sentence(flown)} It bears on {listed([effect_words(e.id) for e in open_questions])}."
         if verdict.unexplained.share > 0.15:
             depends = [regime_words(v)[0] for v in verdict.unexplained.depends_on]
             over = f" over {listed(depends)}" if depends else " over the range in which the error is large"
@@ -589,10 +466,10 @@ def next_text(verdict: Verdict, recordings: RecordingSet) -> str:
         if verdict.verdict == "no_mismatch":
             return "Nothing is open. Faster, higher or rougher flight would show whether the model holds there too."
         return "Nothing is left to distinguish."
-    text = capital(plan.manoeuvre).rstrip(".") + "."
+    text = _sentence(plan.manoeuvre)
     if plan.separates:
         what = "flight" if verdict.kind == "flight" else "session"
-        text += f" It is meant to distinguish {listed([effect_words(i) for i in plan.separates])}. "
+        text += f" It is meant to distinguish {names_of(plan.separates)}. "
         return Markup("{}<code>rotorid plan</code> says which {} within your limits does, if any, and how far.").format(
             text, what
         )
@@ -622,15 +499,15 @@ def make_changes_page(found: Changes) -> str:
         base=found.base,
         new=found.new,
         seen=[] if seen is None else level_one_sentences(seen),
-        quantities="" if seen is None else _drawn(draw_differences, found, names),
+        quantities="" if seen is None else drawn(draw_differences, found, names),
         changes=sentences[: max(1, len(found.changes)) + len(words.advice(found))],
         notes=found.notes,
         whole=words.WHOLE[found.kind],
         left="What each believed vehicle leaves" if flown else "Reading less load",
         measured="Measured less simulated force and moment" if flown else "Reading less the load that is believed",
-        values=_drawn(draw_values, found, {p.symbol: words.name_words(p.symbol) for p in found.values}),
+        values=drawn(draw_values, found, {p.symbol: words.name_words(p.symbol) for p in found.values}),
         limits=[_changed_limit_row(limit) for limit in found.limits],
-        residuals=_drawn(draw_residuals, found, {c: channel_words(c) for c in found.residuals[0]}),
+        residuals=drawn(draw_residuals, found, {c: channel_words(c) for c in found.residuals[0]}),
     )
 
 
@@ -638,16 +515,8 @@ def _changed_limit_row(limit) -> dict[str, str]:
     """A limit's name, size and share of the weight, in words."""
     from rotorid.mismatch.changes import words
 
-    share = words.percent_words(limit.share) if limit.share else ""
+    row = {"name": capital(words.name_words(limit.id)), "at_most": "", "share": ""}
     if limit.id in words.VALUES:
-        return {"name": capital(words.name_words(limit.id)), "at_most": words.percent_words(limit.at_most), "share": ""}
-    size = "" if limit.at_most is None else f"{limit.symbol} {words.number(limit.at_most)} {limit.unit}"
-    return {"name": capital(words.name_words(limit.id)), "at_most": size, "share": share}
-
-
-def _drawn(draw, found: Changes, names: dict[str, str]) -> Markup:
-    """A figure as SVG within the page."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "figure.svg"
-        draw(found, names, path)
-        return drawing(path)
+        return row | {"at_most": percent_words(limit.at_most)}
+    size = "" if limit.at_most is None else f"{limit.symbol} {number(limit.at_most)} {limit.unit}"
+    return row | {"at_most": size, "share": percent_words(limit.share) if limit.share else ""}

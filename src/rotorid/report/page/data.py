@@ -14,7 +14,7 @@ import numpy as np
 
 from rotorid.effects.loading import Loading
 from rotorid.errors import InputError
-from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Delivery
+from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Delivery, by_channel
 from rotorid.mismatch.decide.sizes import fitted_part, segments_of
 from rotorid.mismatch.decide.words import FORWARD_WORDS, channel_words, regime_words
 from rotorid.mismatch.deliver.flown import Model
@@ -68,7 +68,6 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
     every = max(1, int(np.ceil(total / _BUDGET)))
     runs = list(dict.fromkeys(run for run, _ in by_pair))
     largest = _largest_run(analysis, verdict, main)
-    flown = _replay(analysis, verdict, largest, segments)
     return {
         "main": {"channel": main, "run": largest, "shown_s": _first_shown(by_pair.get((largest, main), []))},
         "every": every,
@@ -83,7 +82,7 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
             _series(*pair, traces, read_by_pair[pair], every, analysis.delivery) for pair, traces in by_pair.items()
         ],
         "fit_percent": {c: [round(v, 2) for v in fit] for c, fit in fit_percent(analysis, readings).items()},
-        "replay": None if flown is None else _frames(largest, flown),
+        "replay": _replay(analysis, verdict, largest, segments),
         "locations": [
             {"run": loc.run, "channel": loc.channel, "start": loc.start_s, "stop": loc.stop_s}
             for loc in verdict.locations
@@ -142,48 +141,34 @@ def _series(run: str, channel: str, traces, readings: Sequence[np.ndarray], ever
     return out | ({"measured": packed(reading)} if np.isfinite(reading).any() else {})
 
 
-def _frames(run: str, flown: dict[str, np.ndarray]) -> dict:
-    """The replay's frames as the page's script reads them."""
-    out = {"run": run, "time": _packed_times(flown["time_s"]), "rotors": np.round(flown["rotors"], 5).tolist()}
-    names = [n for n in flown if n not in ("time_s", "rotors")]
-    return out | {name: packed(flown[name].ravel()) for name in names}
-
-
 def _regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrace]]) -> dict:
     """Size of the error by half seconds next to what was flown: variables and, by channel, before and after."""
     most_blocks = 4000
     variables = sorted({v for known in analysis.regimes.values() for v in known if v != "time_s"})
-    channels = list(dict.fromkeys(c for _, c in by_pair))
-    rows: dict[str, dict[str, list[np.ndarray]]] = {}
-    for channel in channels:
-        columns: dict[str, list[np.ndarray]] = {v: [] for v in (*variables, "before", "after")}
-        for (run, name), traces in by_pair.items():
-            if name != channel or run not in analysis.regimes:
-                continue
-            known = analysis.regimes[run]
-            for trace in traces:
-                per = max(2, int(round(REGIME_BLOCK_S / float(np.median(np.diff(trace.time_s))))))
-                count = len(trace.time_s) // per
-                for stage in ("before", "after"):
-                    columns[stage].append(np.sqrt(blocks(getattr(trace, stage) ** 2, per, count)))
-                for v in variables:
-                    flown = known.get(v)
-                    line = np.full(len(trace.time_s), np.nan)
-                    if flown is not None:
-                        line = np.interp(trace.time_s, known["time_s"], flown)
-                    columns[v].append(blocks(line, per, count))
-        if columns["before"]:
-            rows[channel] = columns
-    if not rows or not variables:
+    if not variables:
         return {"variables": {}, "channels": {}}
+    rows: dict[str, dict[str, list[np.ndarray]]] = {}
+    for (run, channel), traces in by_pair.items():
+        if run not in analysis.regimes:
+            continue
+        known = analysis.regimes[run]
+        columns = rows.setdefault(channel, {v: [] for v in (*variables, "before", "after")})
+        for trace in traces:
+            per = max(2, int(round(REGIME_BLOCK_S / float(np.median(np.diff(trace.time_s))))))
+            count = len(trace.time_s) // per
+            for stage in ("before", "after"):
+                columns[stage].append(np.sqrt(blocks(getattr(trace, stage) ** 2, per, count)))
+            for v in variables:
+                missing = np.full(len(trace.time_s), np.nan)
+                line = np.interp(trace.time_s, known["time_s"], known[v]) if v in known else missing
+                columns[v].append(blocks(line, per, count))
     out: dict[str, dict] = {}
-    for channel, columns in rows.items():
-        joined = {k: np.concatenate(v) for k, v in columns.items()}
+    for channel in filter(rows.__contains__, dict.fromkeys(c for _, c in by_pair)):
+        joined = {k: np.concatenate(v) for k, v in rows[channel].items()}
         every = max(1, int(np.ceil(len(joined["before"]) / most_blocks)))
         out[channel] = {k: packed(v[::every]) for k, v in joined.items() if np.isfinite(v).any()}
-    names = {v: " ".join(filter(None, (regime_words(v)[0], f"({regime_words(v)[1]})" if regime_words(v)[1] else "")))
-             for v in variables}  # fmt: skip
-    return {"variables": names, "channels": out}
+    words = {v: regime_words(v) for v in variables} if out else {}
+    return {"variables": {v: f"{n} ({unit})" if unit else n for v, (n, unit) in words.items()}, "channels": out}
 
 
 def blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
@@ -227,35 +212,33 @@ def _correlation(series: Sequence[np.ndarray], lags: np.ndarray) -> list[float]:
     return [sum(float(p[: len(p) - k] @ p[k:]) for p in parts if len(p) > k) / max(power, 1e-300) for k in lags]
 
 
-def _replay(
-    analysis: Analysis, verdict: Verdict, run: str, segments: Sequence[Segment]
-) -> dict[str, np.ndarray] | None:
+def _replay(analysis: Analysis, verdict: Verdict, run: str, segments: Sequence[Segment]) -> dict | None:
     """Frames of up to LONGEST_S of a run, about where most was located; None where attitudes cannot be simulated.
 
     Returns
     -------
-    `time_s` (n,), unit quaternions `recorded`, `before`, `after` (n, 4), body to world, scalar first; `force_before`,
+    `time` (n,), unit quaternions `recorded`, `before`, `after` (n, 4), body to world, scalar first; `force_before`,
     `force_after`, `moment_before`, `moment_after` (n, 3), N and N m, body axes, where the traces have them; `rotors`
     (k, 3), m, body axes. The simulations restart from the recording every half second.
     """
     if analysis.instrument is not None:
         return None
-    usable = [
-        s
-        for s in segments
-        if s.motion.rotation is not None and s.motion.rotor_speed is not None and s.motion.angular_velocity is not None
-    ]
+    usable = [s for s in segments if s.motion.has(("rotation", "rotor_speed", "angular_velocity"))]
     mine = [k for k, s in enumerate(usable) if s.run == run]
     if not mine:
         return None
-    centre = _busiest_s(verdict, run)
-    at = min(mine, key=lambda k: _distance(usable[k].motion.time_s, centre))
-    time_s = usable[at].motion.time_s
-    first = (
-        time_s[0]
-        if centre is None
-        else np.clip(centre - _LONGEST_S / 2, time_s[0], max(time_s[-1] - _LONGEST_S, time_s[0]))
-    )
+    # Within the stretch that is nearest to the middle of the place with the most energy, else from the longest's start.
+    here = [loc for loc in verdict.locations if loc.run == run and loc.start_s is not None and loc.stop_s is not None]
+    if here:
+        busiest = max(here, key=lambda loc: loc.energy_share)
+        centre = 0.5 * (busiest.start_s + busiest.stop_s)
+        ends = {k: usable[k].motion.time_s[[0, -1]] for k in mine}
+        at = min(mine, key=lambda k: max(ends[k][0] - centre, centre - ends[k][1], 0.0))
+        first = np.clip(centre - _LONGEST_S / 2, ends[at][0], max(ends[at][1] - _LONGEST_S, ends[at][0]))
+    else:
+        at = max(mine, key=lambda k: np.ptp(usable[k].motion.time_s))
+        first = usable[at].motion.time_s[0]
+    time_s, shown = usable[at].motion.time_s, None
     out: dict[str, np.ndarray] = {}
     for stage, model in (("before", Model(analysis.believed)), ("after", forward.delivered_model(analysis))):
         found = _windows(usable, at, model)
@@ -269,18 +252,21 @@ def _replay(
         period = float(np.median(np.diff(time_s[windows.sample[0]]))) if windows.sample.shape[1] > 1 else 1.0
         every = max(1, round(1 / _FRAMES_PER_S / period))
         sample = windows.sample[chosen][:, ::every].ravel()
-        if not len(sample) or ("time_s" in out and not np.array_equal(out["time_s"], time_s[sample])):
+        if not len(sample) or (shown is not None and not np.array_equal(shown, time_s[sample])):
             return None
-        out["time_s"] = time_s[sample]
+        shown = time_s[sample]
         out[stage] = windows.predicted.quaternion[chosen][:, ::every].reshape(-1, 4)
         out["recorded"] = recorded[sample]
+    by_name = by_channel(t for t in analysis.traces if t.run == run)
     for group in ("force", "moment"):
-        for stage in ("before", "after"):
-            columns = [_trace(analysis, run, f"{group}_{axis}", stage, out["time_s"]) for axis in "xyz"]
-            if all(c is not None for c in columns):
-                out[f"{group}_{stage}"] = np.stack(columns, axis=1)
-    out["rotors"] = analysis.believed.rotor_positions_m()
-    return out
+        axes = [by_name.get(f"{group}_{axis}") for axis in "xyz"]
+        for stage in ("before", "after") if all(axes) else ():
+            columns = [np.interp(shown, *(np.concatenate([getattr(t, n) for t in own]) for n in ("time_s", stage)))
+                       for own in axes]  # fmt: skip
+            out[f"{group}_{stage}"] = np.stack(columns, axis=1)
+    rotors = np.round(analysis.believed.rotor_positions_m(), 5).tolist()
+    head = {"run": run, "time": _packed_times(shown), "rotors": rotors}
+    return head | {name: packed(values.ravel()) for name, values in out.items()}
 
 
 def _windows(segments: Sequence[Segment], at: int, model: Model) -> tuple[np.ndarray | None, Windows] | None:
@@ -295,29 +281,6 @@ def _windows(segments: Sequence[Segment], at: int, model: Model) -> tuple[np.nda
         except InputError:
             continue
     return None
-
-
-def _busiest_s(verdict: Verdict, run: str) -> float | None:
-    here = [loc for loc in verdict.locations if loc.run == run and loc.start_s is not None and loc.stop_s is not None]
-    if not here:
-        return None
-    best = max(here, key=lambda loc: loc.energy_share)
-    return 0.5 * (best.start_s + best.stop_s)
-
-
-def _distance(time_s: np.ndarray, centre: float | None) -> float:
-    """How far an instant lies outside a stretch; without one, long stretches first."""
-    if centre is None:
-        return -float(time_s[-1] - time_s[0])
-    return max(time_s[0] - centre, centre - time_s[-1], 0.0)
-
-
-def _trace(analysis: Analysis, run: str, channel: str, stage: str, time_s: np.ndarray) -> np.ndarray | None:
-    mine = [t for t in analysis.traces if t.run == run and t.channel == channel]
-    if not mine:
-        return None
-    known = np.concatenate([t.time_s for t in mine])
-    return np.interp(time_s, known, np.concatenate([getattr(t, stage) for t in mine]))
 
 
 def measured(analysis: Analysis, segments: Sequence[Segment] | Sequence[Loading]) -> list[np.ndarray]:
@@ -385,11 +348,11 @@ def fit_percent(analysis: Analysis, readings: Sequence[np.ndarray]) -> dict[str,
     perfect, 0 no better than the mean, negative worse.
     """
     part = fitted_part(analysis)
-    by_channel: dict[str, list[tuple[ChannelTrace, np.ndarray]]] = {}
+    own: dict[str, list[tuple[ChannelTrace, np.ndarray]]] = {}
     for trace, reading in zip(analysis.traces, readings, strict=True):
-        by_channel.setdefault(trace.channel, []).append((trace, reading))
+        own.setdefault(trace.channel, []).append((trace, reading))
     out = {}
-    for channel, pairs in by_channel.items():
+    for channel, pairs in own.items():
         chosen = [p for p in pairs if (part(p[0].run, p[0].time_s) < 0).mean() > 0.5] or pairs
         signal = np.concatenate([reading for _, reading in chosen])
         known = np.isfinite(signal)

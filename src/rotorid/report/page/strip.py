@@ -34,8 +34,6 @@ _STAGES = {"before": "as believed", "after": "improved"}
 
 _Sizes = Mapping[tuple[str, str, str], tuple[np.ndarray, np.ndarray]]
 """(stage, run, channel) to instants, s, and sizes in units of the noise."""
-_Located = Mapping[tuple[str, str], Sequence[tuple[float, float]]]
-"""(run, channel) to intervals, s."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
     shown = [r for r in runs if r in shown[:_MOST_RUNS]]
     if not channels or not shown:
         return None
-    sizes = {}
+    sizes: dict[tuple[str, str, str], tuple[np.ndarray, np.ndarray]] = {}
     for trace in analysis.traces:
         if trace.run in shown and trace.channel in channels:
             noise = verdict.channels[trace.channel].noise_floor
@@ -74,31 +72,18 @@ def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
             for stage in ("before", "after"):
                 size = np.sqrt(blocks(getattr(trace, stage) ** 2, per, count)) / noise
                 key = (stage, trace.run, trace.channel)
-                time_s = blocks(trace.time_s, per, count)
-                if key in sizes:
-                    time_s, size = np.append(sizes[key][0], time_s), np.append(sizes[key][1], size)
-                sizes[key] = (time_s, size)
-    located: dict[tuple[str, str], list] = {}
-    for loc in verdict.locations:
-        located.setdefault((loc.run, loc.channel), []).append((loc.start_s, loc.stop_s))
-    labels = [channel_words(c) for c in channels]
-    held = verdict.runs.held_out if verdict.runs.held_out != verdict.runs.training else ()
-    picture = _drawn(channels, labels, shown, held, sizes, located)
+                before = sizes.get(key, (np.zeros(0), np.zeros(0)))
+                sizes[key] = np.append(before[0], blocks(trace.time_s, per, count)), np.append(before[1], size)
+    picture = _drawn(channels, shown, sizes, verdict)
     caption = "Error of each channel over the runs' time, in units of its noise. Black lines: where it was located."
     if len(shown) < len(runs):
         caption += f" {len(shown)} of {len(runs)} runs are shown."
     return picture, "error over noise by channel and time, before and after", caption
 
 
-def _drawn(
-    channels: Sequence[str],
-    labels: Sequence[str],
-    runs: Sequence[str],
-    held_out: Sequence[str],
-    sizes: _Sizes,
-    located: _Located,
-) -> str:
-    """The strip: as believed above improved; `located` is underlined in the upper part."""
+def _drawn(channels: Sequence[str], runs: Sequence[str], sizes: _Sizes, verdict: Verdict) -> str:
+    """The strip: as believed above improved; what was located is underlined in the upper part."""
+    held_out = verdict.runs.held_out if verdict.runs.held_out != verdict.runs.training else ()
     places = _places(runs, sizes)
     body = _LINE * len(channels)
     tops = dict(zip(_STAGES, (_HEAD, _HEAD + body + _APART), strict=True))
@@ -106,8 +91,9 @@ def _drawn(
     out = []
     for stage, top in tops.items():
         out.append(f'<text transform="translate(9 {top + body / 2}) rotate(-90)" class="m">{_STAGES[stage]}</text>')
-        for line, label in enumerate(labels):
-            out.append(f'<text x="{_LEFT - 6}" y="{top + _LINE * (line + 0.68):.1f}" class="e">{_text(label)}</text>')
+        for line, label in enumerate(map(channel_words, channels)):
+            y = top + _LINE * (line + 0.68)
+            out.append(f'<text x="{_LEFT - 6}" y="{y:.1f}" class="e">{html.escape(label)}</text>')
         for place in places:
             picture = _picture(place, [sizes.get((stage, place.run, channel)) for channel in channels])
             out.append(
@@ -116,11 +102,13 @@ def _drawn(
             )
     for place in places:
         out += _around(place, tops, body, place.run in held_out)
-        out += [
-            f'<path d="M{place.x(start):.1f} {tops["before"] + _LINE * (line + 1) - 1}H{place.x(stop):.1f}" class="l"/>'
-            for line, channel in enumerate(channels)
-            for start, stop in located.get((place.run, channel), ())
-        ]
+        for line, channel in enumerate(channels):
+            under = tops["before"] + _LINE * (line + 1) - 1
+            out += [
+                f'<path d="M{place.x(loc.start_s):.1f} {under}H{place.x(loc.stop_s):.1f}" class="l"/>'
+                for loc in verdict.locations
+                if (loc.run, loc.channel) == (place.run, channel)
+            ]
     middle = _LEFT + (_WIDTH - _LEFT - _RIGHT) / 2
     out += [f'<text x="{middle}" y="{height - 4}" class="m">time (s)</text>', *_scale(tops["before"], height - _FOOT)]
     return f'<svg viewBox="0 0 {_WIDTH} {height}" class="strip" role="img">{"".join(out)}</svg>'
@@ -128,7 +116,12 @@ def _drawn(
 
 def _places(runs: Sequence[str], sizes: _Sizes) -> list[_Place]:
     """The runs side by side, each as wide as it is long."""
-    spans = [_span(run, sizes) for run in runs]
+    spans = []
+    for run in runs:
+        times = [t for (_, r, _), (t, _) in sizes.items() if r == run and len(t)]
+        start, stop = (min(t[0] for t in times), max(t[-1] for t in times)) if times else (0.0, 0.0)
+        # One of a single cell is as wide as that.
+        spans.append((start, stop) if stop > start else (start - _CELL_S / 2, stop + _CELL_S / 2))
     room = _WIDTH - _LEFT - _RIGHT - _BETWEEN * (len(runs) - 1)
     scale = room / sum(stop - start for start, stop in spans)
     out, left = [], float(_LEFT)
@@ -136,13 +129,6 @@ def _places(runs: Sequence[str], sizes: _Sizes) -> list[_Place]:
         out.append(_Place(run, left, scale * (stop - start), start, stop))
         left += out[-1].width + _BETWEEN
     return out
-
-
-def _span(run: str, sizes: _Sizes) -> tuple[float, float]:
-    """First and last instant of a run; one of a single cell is as wide as that."""
-    times = [t for (_, r, _), (t, _) in sizes.items() if r == run and len(t)]
-    start, stop = (min(t[0] for t in times), max(t[-1] for t in times)) if times else (0.0, 0.0)
-    return (start, stop) if stop > start else (start - _CELL_S / 2, stop + _CELL_S / 2)
 
 
 def _picture(place: _Place, sizes: Sequence[tuple[np.ndarray, np.ndarray] | None]) -> str:
@@ -180,7 +166,7 @@ def _around(place: _Place, tops: Mapping[str, int], body: int, held_out: bool) -
     fits = max(1, int((place.width + _BETWEEN) / _LETTER))
     name = place.run if len(place.run) <= fits else f"{place.run[: max(1, fits - 1)]}…"
     middle, bottom = place.left + place.width / 2, tops["after"] + body
-    out = [f'<text x="{middle:.1f}" y="12" class="n">{_text(name)}</text>']
+    out = [f'<text x="{middle:.1f}" y="12" class="n">{html.escape(name)}</text>']
     if held_out:
         out.append(f'<text x="{middle:.1f}" y="24" class="n">held out</text>')
     for time_s in _ticks(place):
@@ -214,8 +200,3 @@ def _scale(top: float, bottom: float) -> list[str]:
         y = bottom - height * float(_share(size))
         out.append(f'<path d="M{left + 9} {y:.1f}h3" class="t"/><text x="{left + 14}" y="{y + 3.5:.1f}">{size}</text>')
     return out
-
-
-def _text(name: str) -> str:
-    """A name as it stands in SVG."""
-    return html.escape(name)

@@ -25,11 +25,21 @@ from scipy.optimize import brentq
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
-from rotorid.vehicle.exports.forms import KNOWS, Exported, Parts, allocated, named_in_one_line, parts_of, sdf
+from rotorid.vehicle.exports.forms import (
+    KNOWS,
+    Exported,
+    Parts,
+    allocated,
+    for_qgroundcontrol,
+    in_corners,
+    in_entries,
+    named_in_one_line,
+    not_expressed,
+    parts_of,
+    sdf,
+)
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-_CORNERS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
-"""Signs of the places (x forward, y right) in that order."""
 _SENSES = (1, 1, -1, -1)
 """Signs of the yaw moments: front right and rear left turn counter-clockwise."""
 _INERTIA_TIMES, _LEAST_DETERMINANT = 100.0, np.finfo(np.float32).eps
@@ -81,10 +91,9 @@ def _in_x(vehicle: Vehicle, to: str, tool: str) -> tuple[Parts, list[int], float
     InputError where the rotors are not four in X shape, or turn the other way.
     """
     parts = parts_of(with_drag_of_hover(vehicle), KNOWS[to])
-    corners = {(int(np.sign(x)), int(np.sign(y))): i for i, (x, y, _) in enumerate(parts.places)}
-    if len(parts.places) != 4 or set(corners) != set(_CORNERS):
+    order = in_corners(parts.places, ((1, 1), (-1, -1), (1, -1), (-1, 1)))
+    if order is None or len(parts.places) != 4:
         raise InputError(f"{vehicle.name}: {tool} wants four rotors in X shape, found {len(parts.places)} rotors")
-    order = [corners[corner] for corner in _CORNERS]
     if tuple(int(vehicle.yaw_signs()[i]) for i in order) != _SENSES:
         raise InputError(
             f"{vehicle.name}: {tool} wants front right and rear left counter-clockwise, seen from above, "
@@ -111,16 +120,11 @@ def px4_sih(vehicle: Vehicle) -> Exported:
     for words, values in (("roll", places[:, 1]), ("pitch", places[:, 0])):
         if np.ptp(np.abs(values)) > 1e-6:
             left.append(f"arms in {words} of each rotor: their mean is taken")
-    hover = hover_speed_rad_s(vehicle)
-    drag = len(order) * float(np.mean(parts.drag)) * hover
-    if drag:
+    if any(parts.drag):
         left.append("rotor drag: that of the hover's rotor speed is taken, and along z as along x and y")
-    # X_u and the like come on top; SIH's drag and damping are not below 0.
-    own, weights = own_damping(vehicle, turning=False)
-    drag = max(drag + float(np.average(own, weights=weights)), 0.0)
+    drag, j = _drag_n_s_m(vehicle, parts), parts.inertia
     if np.ptp(parts.damping) > 0:
         left.append("damping about each axis: its mean is taken")
-    j = parts.inertia
     own, weights = own_damping(vehicle, turning=True)
     damping = max(float(np.mean(parts.damping) + np.average(own, weights=weights / np.diag(j) ** 2)), 0.0)
     up, down = parts.tau_s
@@ -137,19 +141,22 @@ def px4_sih(vehicle: Vehicle) -> Exported:
             "needed), which is then zero, and this vehicle cannot rotate there at all"
         )
     values = {
-        "SIH_MASS": parts.mass_kg,
-        "SIH_IXX": j[0, 0], "SIH_IYY": j[1, 1], "SIH_IZZ": j[2, 2],
-        "SIH_IXY": j[0, 1], "SIH_IXZ": j[0, 2], "SIH_IYZ": j[1, 2],
+        "SIH_MASS": parts.mass_kg, **{f"SIH_I{name.upper()}": value for name, value in in_entries(j).items()},
         "SIH_T_MAX": thrust.mean() * full**2, "SIH_Q_MAX": torque.mean() * full**2,
         "SIH_L_ROLL": np.abs(places[:, 1]).mean(), "SIH_L_PITCH": np.abs(places[:, 0]).mean(),
         "SIH_KDV": drag, "SIH_KDW": damping, "SIH_T_TAU": tau_s, "THR_MDL_FAC": 0.0,
     }  # fmt: skip
-    comments = [f"# {vehicle.name}, exported by rotorid for PX4's SIH", *(f"# Not expressed: {s}" for s in left)]
-    comments += [f"# {sentence}" for sentence in _OF_THE_TOOL]
-    rows = ["1\t1\tSIH_VEHICLE_TYPE\t0\t6", *(f"1\t1\t{name}\t{float(value):.9g}\t9" for name, value in values.items())]
-    return Exported(
-        "\n".join([*comments, *rows]) + "\n", "sih.params", tuple(left), parameters=values, rotor_order=tuple(order)
-    )
+    lines = [f"# {vehicle.name}, exported by rotorid for PX4's SIH", *not_expressed(left)]
+    lines += [*(f"# {sentence}" for sentence in _OF_THE_TOOL), *for_qgroundcontrol({"SIH_VEHICLE_TYPE": 0, **values})]
+    text = "\n".join(lines) + "\n"
+    return Exported(text, "sih.params", tuple(left), parameters=values, rotor_order=tuple(order))
+
+
+def _drag_n_s_m(vehicle: Vehicle, parts: Parts) -> float:
+    """One linear drag of the vehicle: that of the rotors in hover, and X_u and the like on top; not below 0."""
+    own, weights = own_damping(vehicle, turning=False)
+    rotors = len(parts.places) * float(np.mean(parts.drag)) * hover_speed_rad_s(vehicle)
+    return max(rotors + float(np.average(own, weights=weights)), 0.0)
 
 
 def sih_values(text: str) -> dict[str, float]:
@@ -258,11 +265,8 @@ def _airframe(vehicle: Vehicle, name: str) -> str:
     ]  # fmt: skip
     lines += [f"param set-default {name} {value:.6g}" for name, value in allocated(parts, vehicle.yaw_signs())]
     for i in range(1, vehicle.rotor_count + 1):
-        lines += [
-            f"param set-default SIM_GZ_EC_FUNC{i} {100 + i}",
-            f"param set-default SIM_GZ_EC_MIN{i} {round(low)}",
-            f"param set-default SIM_GZ_EC_MAX{i} {round(high)}",
-        ]
+        ends = {"FUNC": 100 + i, "MIN": round(low), "MAX": round(high)}
+        lines += [f"param set-default SIM_GZ_EC_{end}{i} {value}" for end, value in ends.items()]
     share = vehicle.mass_kg * vehicle.gravity_m_s2 / float((parts.thrust * high**2).sum())
     squared = low < low_start * high
     # The signal at which speeds from the lowest to the highest make that share of the thrust.
@@ -288,22 +292,18 @@ def ardupilot_json(vehicle: Vehicle) -> Exported:
     area = len(order) * np.pi * (vehicle.rotor_radius_m or diagonal / 8) ** 2
     if vehicle.rotor_radius_m is None:
         left.append("rotor_radius_m is not stated: an eighth of the diagonal is taken for the disc's area")
-    drag = len(order) * float(np.mean(parts.drag)) * hover_speed_rad_s(vehicle)
-    # X_u and the like come on top, as the drag of the hover's thrust.
-    own, weights = own_damping(vehicle, turning=False)
-    drag = max(drag + float(np.average(own, weights=weights)), 0.0)
+    drag = _drag_n_s_m(vehicle, parts)
     momentum = drag / np.sqrt(DENSITY_KG_M3 * area * weight)
     if drag:
         left.append("linear drag: it goes with the root of the thrust there, and along z as well")
     bluff = 2 * float(np.mean(parts.frame[:2])) / DENSITY_KG_M3
     if bluff:
         left.append("drag of the frame: by component there, and the same along every axis")
-    rate = 0.0
     own, weights = own_damping(vehicle, turning=True)
     inertia = np.diag(parts.inertia)
     damping = float(np.mean(np.array(parts.damping) / inertia) + np.average(own / inertia, weights=weights))
+    rate = float(_DAMPING_RAD_S / damping) if damping > 0 else 0.0
     if damping > 0:
-        rate = float(_DAMPING_RAD_S / damping)
         left.append("damping about each axis: one rate for all is taken")
     if not any(entry["id"] == "motor_lag" for entry in vehicle.effects):
         left.append("motor lag: it has none but a limit of the signal's slope")
@@ -337,16 +337,15 @@ def ardupilot_json(vehicle: Vehicle) -> Exported:
         "slew_max": 0.0,
         "disc_area": float(area),
         "mdrag_coef": float(momentum),
-        "moment_inertia": np.diag(parts.inertia).tolist(),
+        "moment_inertia": inertia.tolist(),
         "num_motors": 4.0,
     }
     for i, (place, sense, factor) in enumerate(zip(places, _SENSES, yaw, strict=True), 1):
         content[f"motor{i}_position"] = place.tolist()
         content[f"motor{i}_vector"] = [0.0, 0.0, -1.0]
         content[f"motor{i}_yaw"] = float(sense * factor)
-    comments = [f"# {vehicle.name}, exported by rotorid: sim_vehicle.py -v ArduCopter -f X:frame.json"]
-    comments += [f"# Not expressed: {sentence}" for sentence in left]
-    text = "\n".join(comments) + "\n" + json.dumps(content, indent=2) + "\n"
+    head = f"# {vehicle.name}, exported by rotorid: sim_vehicle.py -v ArduCopter -f X:frame.json"
+    text = "\n".join([head, *not_expressed(left), json.dumps(content, indent=2)]) + "\n"
     return Exported(text, "frame.json", tuple(left), parameters=content, rotor_order=tuple(order))
 
 

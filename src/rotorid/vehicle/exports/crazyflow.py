@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, left_of_the_lowest_speed, parts_of
+from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, left_of_the_lowest_speed, not_expressed, parts_of
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
 SECTION = "rotorid"
@@ -56,15 +56,13 @@ def crazyflow(vehicle: Vehicle) -> Exported:
         "mixing_matrix": mixing.tolist(),
         "drag_matrix": np.diag([-drag, -drag, 0.0]).tolist(),
     }
-    comments = "".join(f"# Not expressed: {sentence}\n" for sentence in left)
-    text = (
-        f"# {vehicle.name}: a section of crazyflow/dynamics/first_principles/params.toml (crazyflow 0.4).\n"
-        "# Either rename it to a drone of crazyflow's list and put it in place of that one's,\n"
-        f"# or give its values to `dynamics` of crazyflow.dynamics.first_principles.\n{comments}\n[{SECTION}]\n"
-    )
-    return Exported(
-        text + "".join(f"{name} = {_toml(value)}\n" for name, value in rows.items()), "params.toml", tuple(left)
-    )
+    lines = [
+        f"# {vehicle.name}: a section of crazyflow/dynamics/first_principles/params.toml (crazyflow 0.4).",
+        "# Either rename it to a drone of crazyflow's list and put it in place of that one's,",
+        "# or give its values to `dynamics` of crazyflow.dynamics.first_principles.",
+        *not_expressed(left), "", f"[{SECTION}]", *(f"{name} = {_toml(value)}" for name, value in rows.items()), "",
+    ]  # fmt: skip
+    return Exported("\n".join(lines), "params.toml", tuple(left))
 
 
 def _toml(value: float | list) -> str:

@@ -53,10 +53,11 @@ def _said_of(derivatives: Sequence[Derivative], vehicle: Vehicle) -> str:
     return f"derivatives ({', '.join(words)})"
 
 
-def left_of(vehicle: Vehicle, taken: Sequence[Derivative]) -> list[str]:
-    """A sentence for the derivatives that are not `taken`; none where all are."""
+def left_of(vehicle: Vehicle, taken: Sequence[Derivative], nearly: str = "") -> list[str]:
+    """A sentence for the derivatives that are not `taken`, and one for those that are `nearly` so; none for none."""
     rest = [d for d in vehicle.derivatives if d not in taken]
-    return [_said_of(rest, vehicle)] if rest else []
+    said = [f"{_said_of(taken, vehicle)}: {nearly}"] if taken and nearly else []
+    return [*said, _said_of(rest, vehicle)] if rest else said
 
 
 def _table_in_flu(derivatives: Sequence[Derivative]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -158,11 +159,8 @@ def gazebo_damping(vehicle: Vehicle) -> str:
 
 def left_of_gazebo(vehicle: Vehicle) -> list[str]:
     """What Gazebo's linear terms leave."""
-    taken = of_state(vehicle, constants=False)
-    if not taken:
-        return left_of(vehicle, ())
     near = "taken as linear terms of Gazebo's Hydrodynamics, which are not held beyond the flown range and know no wind"
-    return [f"{_said_of(taken, vehicle)}: {near}", *left_of(vehicle, taken)]
+    return left_of(vehicle, of_state(vehicle, constants=False), near)
 
 
 def own_damping(vehicle: Vehicle, turning: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -180,7 +178,5 @@ def own_damping(vehicle: Vehicle, turning: bool) -> tuple[np.ndarray, np.ndarray
 def left_of_one_damping(vehicle: Vehicle) -> list[str]:
     """What one drag and one damping of all axes leave."""
     taken = [d for d in vehicle.derivatives if (d.channel, d.quantity) in _DAMPING]
-    if not taken:
-        return left_of(vehicle, ())
     near = "taken as one drag and one damping of all axes, means by the squares of what was flown, without its range"
-    return [f"{_said_of(taken, vehicle)}: {near}", *left_of(vehicle, taken)]
+    return left_of(vehicle, taken, near)

@@ -10,7 +10,7 @@ equations from the file's numbers.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -105,13 +105,28 @@ def difference(
     )
 
 
-def multirotor_of(exported: Exported) -> type:
-    """RotorPy's Multirotor, or that of the file's companion."""
+def through_rotorpy(
+    exported: Exported, state: dict[str, np.ndarray], speeds: np.ndarray, steps_s: Iterable[float], at_once: bool,
+    **how: Any,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Flight of RotorPy's Multirotor, or that of the file's companion, from a state on: x, v, q and w, (n + 1, ...).
+
+    Each of the speeds (n, k), rad/s, is commanded for its step; `at_once` it is set as the rotors' own.
+    """
     from rotorpy.vehicles.multirotor import Multirotor
 
     scope: dict[str, Any] = {"WithDerivatives": Multirotor}
     exec(exported.companions.get(ROTORPY_FILE, ""), scope)
-    return scope["WithDerivatives"]
+    with read_by("RotorPy"):
+        flyer = scope["WithDerivatives"](exported.parameters, state, control_abstraction="cmd_motor_speeds", **how)
+    if at_once:  # the speed is set at every step and stays over it
+        flyer.tau_m = 1e6
+    kept = [state]
+    for speed, step_s in zip(speeds, steps_s, strict=True):
+        state = {**state, "rotor_speeds": speed} if at_once else state
+        state = flyer.step(state, {"cmd_motor_speeds": speed}, step_s)
+        kept.append(state)
+    return {name: np.array([np.asarray(s[name]) for s in kept]) for name in ("x", "v", "q", "w")}
 
 
 @contextmanager
@@ -138,23 +153,11 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) ->
         "x": np.zeros(3), "v": np.array([_START_M_S, -_START_M_S, 0.0]), "q": np.array([0.0, 0.0, 0.0, 1.0]),
         "w": np.zeros(3), "wind": np.zeros(3), "rotor_speeds": speeds[0],
     }  # fmt: skip
-    tight = {"method": "RK45", "rtol": 1e-6, "atol": 1e-9}
-    with read_by("RotorPy"):
-        flyer = multirotor_of(exported)(
-            exported.parameters, state, control_abstraction="cmd_motor_speeds", integrator_kwargs=tight
-        )
-    at_once = tau_s == AT_ONCE_S
-    if at_once:  # the speed is set at every step and stays over it
-        flyer.tau_m = 1e6
-    position, attitude = [state["x"]], [np.array([1.0, 0, 0, 0])]
-    for k in range(len(time) - 1):
-        if at_once:
-            state["rotor_speeds"] = speeds[k]
-        state = flyer.step(state, {"cmd_motor_speeds": speeds[k]}, _STEP_S)
-        position.append(state["x"])
-        attitude.append(np.asarray(state["q"])[[3, 0, 1, 2]])
+    tight, at_once = {"method": "RK45", "rtol": 1e-6, "atol": 1e-9}, tau_s == AT_ONCE_S
+    steps_s = [_STEP_S] * (len(time) - 1)
+    there = through_rotorpy(exported, state, speeds[:-1], steps_s, at_once, integrator_kwargs=tight)
     turning = speeds if at_once else lagging(speeds, tau_s, tau_s)
-    return difference((np.array(position), np.array(attitude)), ours(same, turning), "RotorPy")
+    return difference((there["x"], there["q"][:, [3, 0, 1, 2]]), ours(same, turning), "RotorPy")
 
 
 def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> _FlightDifference:

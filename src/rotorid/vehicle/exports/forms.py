@@ -10,7 +10,7 @@ estimate). A tool that wants more takes nothing from the vehicle: its file is no
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
 
@@ -37,6 +37,7 @@ _FOUR_ROTORS = {"rotorpy": "RotorPy", "gym-pybullet-drones": "gym-pybullet-drone
 _EXACT_BODIES = {"mjcf": "MuJoCo", "sdf": "Gazebo"}
 """Forms of tools that take no inertia with a principal moment above the sum of the others, by however little."""
 FLU = np.array([1.0, -1.0, -1.0])
+_LINE = "\n"
 _MOVED_CENTRES = ("moment", "moment and lever arm", "moment and lever arm, in space")
 """Forms of `com_offset` whose moment is that of rotors which sit elsewhere."""
 AT_ONCE_S = 1e-3
@@ -113,6 +114,30 @@ _GRAVITY_M_S2 = {"rotorpy": 9.81, "crazyflow": 9.81}
 """Of tools that have their own, which no file changes and no caller of theirs sets."""
 
 
+def in_entries(matrix: np.ndarray, names: tuple[str, ...] = ("xx", "yy", "zz", "xy", "xz", "yz")) -> dict[str, float]:
+    """A symmetric matrix (3, 3) by the names of its entries."""
+    return {name: float(matrix["xyz".index(name[0]), "xyz".index(name[1])]) for name in names}
+
+
+def not_expressed(left: Iterable[str]) -> list[str]:
+    """What a file does not express, as comments behind a hash."""
+    return [f"# Not expressed: {sentence}" for sentence in left]
+
+
+def for_qgroundcontrol(values: Mapping[str, float]) -> list[str]:
+    """Lines of parameters as QGroundControl loads them: a whole number's kind is 6, another one's 9."""
+    return [
+        f"1\t1\t{name}\t{value:d}\t6" if isinstance(value, int) else f"1\t1\t{name}\t{float(value):.9g}\t9"
+        for name, value in values.items()
+    ]
+
+
+def in_corners(places: np.ndarray, corners: Sequence[tuple[int, int]]) -> list[int] | None:
+    """Which rotor, by its place (n, 3), is in each corner (signs of x and y); None where they are not in X shape."""
+    there = {(int(np.sign(x)), int(np.sign(y))): i for i, (x, y, _) in enumerate(places)}
+    return [there[corner] for corner in corners] if set(there) == set(corners) else None
+
+
 def named_in_one_line(vehicle: Vehicle) -> Vehicle:
     """The vehicle with a name that ends no comment: text of a file is never a line of another."""
     return vehicle.model_copy(update={"name": printable(" ".join(vehicle.name.split()))})
@@ -132,12 +157,10 @@ def expressed(vehicle: Vehicle, to: str) -> Vehicle:
         ("flapping_moment", "at the hubs", {"k_flap": parts.flap}),
         ("frame_drag", "per axis", dict(zip(("c_x", "c_y", "c_z"), parts.frame, strict=True))),
     )
-    j, axes = parts.inertia, ("x_m", "y_m", "z_m")
-    places = [dict(zip(axes, place, strict=True)) for place in parts.places.tolist()]
-    inertia = {a + b: float(j["xyz".index(a), "xyz".index(b)]) for a, b in ("xx", "yy", "zz", "xy", "xz", "yz")}
+    places = [dict(zip(("x_m", "y_m", "z_m"), place, strict=True)) for place in parts.places.tolist()]
     return vehicle.model_copy(
         update={
-            "inertia_kg_m2": vehicle.inertia_kg_m2.model_copy(update=inertia),
+            "inertia_kg_m2": vehicle.inertia_kg_m2.model_copy(update=in_entries(parts.inertia)),
             "rotors": tuple(r.model_copy(update=p) for r, p in zip(vehicle.rotors, places, strict=True)),
             "thrust_coefficient_n_s2": tuple(parts.thrust.tolist()),
             "torque_coefficient_n_m_s2": tuple(parts.torque.tolist()),
@@ -158,7 +181,18 @@ def parts_of(vehicle: Vehicle, knows: frozenset[str]) -> Parts:
         "thrust": vehicle.thrust_coefficients_n_s2(),
         "torque": vehicle.torque_coefficients_n_m_s2(),
     }
-    left = _left_of_its_own(values, knows)
+    left = []
+    for name in ("thrust", "torque"):
+        own = values[name]
+        if f"each_{name}" not in knows and np.ptp(own) > 0:
+            shown = ", ".join(f"{v:.4g}" for v in own)
+            left.append(f"{name} coefficients differ between rotors ({shown}): their mean is taken")
+            values[name] = np.full(len(own), own.mean())
+    diagonal = np.diag(np.diag(values["inertia"]))
+    if "inertia_products" not in knows and np.any(products := values["inertia"] - diagonal):
+        shown = ", ".join(f"J_{k} = {v:.4g}" for k, v in in_entries(products, ("xy", "xz", "yz")).items())
+        left.append(f"products of inertia ({shown})")
+        values["inertia"] = diagonal
     for entry in vehicle.effects:
         name, form, p = entry["id"], entry.get("form", ""), {k: float(v) for k, v in entry["parameters"].items()}
         said = printable(f"{name} ({form}: {', '.join(f'{k} = {v:.4g}' for k, v in p.items())})")
@@ -172,23 +206,12 @@ def parts_of(vehicle: Vehicle, knows: frozenset[str]) -> Parts:
     return Parts(vehicle.mass_kg, left_out=tuple(left), **values)
 
 
-def _left_of_its_own(values: dict, knows: frozenset[str]) -> list[str]:
-    """Put what a form has of the vehicle's own values into the parts; sentences for what it has not."""
-    left = []
-    for name in ("thrust", "torque"):
-        own = values[name]
-        if f"each_{name}" not in knows and np.ptp(own) > 0:
-            shown = ", ".join(f"{v:.4g}" for v in own)
-            left.append(f"{name} coefficients differ between rotors ({shown}): their mean is taken")
-            values[name] = np.full(len(own), own.mean())
-    j = values["inertia"]
-    if "inertia_products" not in knows and np.any(products := j - np.diag(np.diag(j))):
-        shown = ", ".join(f"J_{k} = {products['xyz'.index(k[0]), 'xyz'.index(k[1])]:.4g}" for k in ("xy", "xz", "yz"))
-        left.append(f"products of inertia ({shown})")
-        values["inertia"] = np.diag(np.diag(j))
-    return left
-
-
+_BY_HUB = {
+    "axial_inflow": ("inflow", "k_z"),
+    "translational_lift": ("lift", "k_h"),
+    "flapping_moment": ("flap", "k_flap"),
+}
+"""Effects with a constant of each hub, their part and the constant."""
 _BY_AXIS = {
     **{("frame_drag", form): "frame" for form in ("isotropic", "per axis")},
     **{("rotational_damping", form): "damping" for form in ("one constant", "linear")},
@@ -202,15 +225,10 @@ def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str
     if name == "rotor_drag" and "k_d" in p:
         values["drag"] = (p["k_d"], p["k_d"])
         return at_hubs
-    if name == "axial_inflow" and "k_z" in p:
-        values["inflow"] = p["k_z"]
+    if name in _BY_HUB and _BY_HUB[name][1] in p and (at_hubs is True or name != "flapping_moment"):
+        part, constant = _BY_HUB[name]
+        values[part] = p[constant]
         return at_hubs
-    if name == "translational_lift":
-        values["lift"] = p["k_h"]
-        return at_hubs
-    if name == "flapping_moment" and form == "at the hubs":
-        values["flap"] = p["k_flap"]
-        return True
     if (name, form) in _BY_AXIS:
         values[_BY_AXIS[name, form]] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
         return True
@@ -233,11 +251,8 @@ def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str
         arm = "" if form == "moment" else "; the accelerometer stays where it was"
         return f"taken as rotors that sit elsewhere, so that their drag acts there, too{arm}"
     if name == "inertia_products":
-        j = values["inertia"].copy()
-        for (a, b), key in (((0, 1), "J_xy"), ((0, 2), "J_xz"), ((1, 2), "J_yz")):
-            j[a, b] += p.get(key, 0.0)
-            j[b, a] = j[a, b]
-        values["inertia"] = j
+        xy, xz, yz = (p.get(key, 0.0) for key in ("J_xy", "J_xz", "J_yz"))
+        values["inertia"] = values["inertia"] + np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
         return True
     return False
 
@@ -258,10 +273,8 @@ def _in_flu(inertia: np.ndarray) -> np.ndarray:
 def _companion(vehicle: Vehicle, name: str, text_of: Callable[[Vehicle], str]) -> tuple[list[str], dict[str, str]]:
     """Sentences for what a tool with a companion leaves of the derivatives, and the companion's name and text."""
     taken = of_state(vehicle)
-    if not taken:
-        return left_of(vehicle, ()), {}
-    said = f"derivatives: this file has none, {name} next to it adds them in the tool's own step"
-    return [said, *left_of(vehicle, taken)], {name: text_of(vehicle)}
+    said = [f"derivatives: this file has none, {name} next to it adds them in the tool's own step"] if taken else []
+    return [*said, *left_of(vehicle, taken)], {name: text_of(vehicle)} if taken else {}
 
 
 def rotorpy(vehicle: Vehicle) -> Exported:
@@ -280,11 +293,12 @@ def rotorpy(vehicle: Vehicle) -> Exported:
         left.append(
             "place of the accelerometer: RotorPy reads rI nowhere, give it to its Imu: Imu(p_BS=quad_params['rI'])"
         )
-    j, hover = _in_flu(parts.inertia), hover_speed_rad_s(expressed(vehicle, "rotorpy"))
+    entries = in_entries(_in_flu(parts.inertia), ("xx", "yy", "zz", "xy", "yz", "xz"))
+    hover = hover_speed_rad_s(expressed(vehicle, "rotorpy"))
     low, high = parts.limits_rad_s or (0.0, 10 * hover)
     values = {
         "mass": parts.mass_kg,
-        **{f"I{a}{b}": float(j["xyz".index(a), "xyz".index(b)]) for a, b in ("xx", "yy", "zz", "xy", "yz", "xz")},
+        **{f"I{name}": value for name, value in entries.items()},
         "num_rotors": vehicle.rotor_count,
         "rotor_pos": {f"r{i}": (place * FLU).tolist() for i, place in enumerate(parts.places, 1)},
         "rotor_directions": [-float(s) for s in vehicle.yaw_signs()],
@@ -299,9 +313,7 @@ def rotorpy(vehicle: Vehicle) -> Exported:
     }  # fmt: skip
     # As Python writes a text: whatever is in the name, it stays one.
     lines = [repr(f"{vehicle.name}, exported by rotorid for RotorPy (body forward-left-up, SI units)."), ""]
-    lines += ["import numpy as np", ""]
-    lines += [f"# Not expressed: {sentence}" for sentence in left]
-    lines.append("quad_params = {")
+    lines += ["import numpy as np", "", *not_expressed(left), "quad_params = {"]
     for key, value in values.items():
         if key == "rotor_pos":
             lines.append('    "rotor_pos": {')
@@ -342,9 +354,7 @@ def mjcf(vehicle: Vehicle) -> Exported:
             left.append(f"motor_lag: a lag of the rotor speed is taken as one of the thrust, {tau_s:.4g} s")
     added, companions = _companion(vehicle, MUJOCO_FILE, mujoco_companion)
     left += added
-    j = _in_flu(parts.inertia)
-    full = _numbers((j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]))
-    limit = parts.limits_rad_s
+    full, limit = _numbers(in_entries(_in_flu(parts.inertia)).values()), parts.limits_rad_s
     dynamics = f' dyntype="filterexact" dynprm="{tau_s:.9g}"' if tau_s > 0 else ""
     sites, motors = [], []
     for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True), 1):
@@ -354,25 +364,22 @@ def mjcf(vehicle: Vehicle) -> Exported:
         most = f' ctrlrange="{ends}"' if limit else ""
         sites.append(f'      <site name="rotor_{i}" pos="{at}"/>')
         motors.append(f'    <general name="rotor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {ratio:.9g}"{most}{dynamics}/>')
-    comments = _comments(left)
-    c_f = ", ".join(f"{v:.6g}" for v in parts.thrust)
+    c_f, said = ", ".join(f"{v:.6g}" for v in parts.thrust), _comments(left)
     late = "\n  <!-- Thrust follows its control late: set data.act to the first thrust. -->" if tau_s > 0 else ""
-    name = quoteattr(vehicle.name)
-    nl = "\n"
-    text = f"""<mujoco model={name}>
+    text = f"""<mujoco model={quoteattr(vehicle.name)}>
   <!-- Flies in MuJoCo and, unchanged, in MJX. -->
-{comments}  <!-- Control i is the thrust of rotor i in N: C_F times the square of its speed, C_F = {c_f} N s2. -->{late}
+{said}  <!-- Control i is the thrust of rotor i in N: C_F times the square of its speed, C_F = {c_f} N s2. -->{late}
   <option timestep="0.001" gravity="0 0 -{vehicle.gravity_m_s2:g}" integrator="RK4"/>
   <worldbody>
     <body name="vehicle" pos="0 0 1">
       <freejoint/>
       <inertial pos="0 0 0" mass="{parts.mass_kg:.9g}" fullinertia="{full}"/>
       <geom type="box" size="0.02 0.02 0.01" contype="0" conaffinity="0" mass="0"/>
-{nl.join(sites)}
+{_LINE.join(sites)}
     </body>
   </worldbody>
   <actuator>
-{nl.join(motors)}
+{_LINE.join(motors)}
   </actuator>
 </mujoco>
 """
@@ -393,20 +400,17 @@ def px4(vehicle: Vehicle) -> Exported:
     """Parameters of PX4's control allocation and thrust model, as QGroundControl loads them."""
     parts = parts_of(vehicle, KNOWS["px4"])
     left = [*parts.left_out, "mass and inertia: they are parameters of PX4's own simulator alone (--to px4-sih)"]
-    rows: list[tuple[str, float, int]] = [("CA_AIRFRAME", 0, 6), ("CA_ROTOR_COUNT", vehicle.rotor_count, 6)]
-    rows += [(name, value, 9) for name, value in allocated(parts, vehicle.yaw_signs())]
+    values = {"CA_AIRFRAME": 0, "CA_ROTOR_COUNT": vehicle.rotor_count, **dict(allocated(parts, vehicle.yaw_signs()))}
     limit = parts.limits_rad_s
     if limit or parts.curve:
-        rows.append(("THR_MDL_FAC", 1.0 - parts.curve, 9))
+        values["THR_MDL_FAC"] = 1.0 - parts.curve
     if limit:
         full = float((parts.thrust * limit[1] ** 2).sum())
-        rows.append(("MPC_THR_HOVER", min(max(vehicle.mass_kg * vehicle.gravity_m_s2 / full, 0.1), 0.8), 9))
+        values["MPC_THR_HOVER"] = min(max(vehicle.mass_kg * vehicle.gravity_m_s2 / full, 0.1), 0.8)
     else:
         left.append("hover thrust: rotor_speed_limits_rad_s is not stated")
-    comments = [f"# {vehicle.name}, exported by rotorid", *(f"# Not expressed: {s}" for s in left)]
-    lines = [f"1\t1\t{name}\t{value:d}\t{kind}" if kind == 6 else f"1\t1\t{name}\t{value:.9g}\t{kind}"
-             for name, value, kind in rows]  # fmt: skip
-    return Exported("\n".join([*comments, *lines]) + "\n", "vehicle.params", tuple(left))
+    lines = [f"# {vehicle.name}, exported by rotorid", *not_expressed(left), *for_qgroundcontrol(values)]
+    return Exported("\n".join(lines) + "\n", "vehicle.params", tuple(left))
 
 
 def left_of_the_lowest_speed(parts: Parts) -> list[str]:
@@ -429,7 +433,6 @@ def sdf(vehicle: Vehicle) -> Exported:
         left.append(f"rotors that follow at once: Gazebo's motor model needs a lag, {AT_ONCE_S:g} s is taken")
     if vehicle.gravity_m_s2 != 9.81:
         left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: it belongs to Gazebo's world file")
-    j = _in_flu(parts.inertia)
     most = (parts.limits_rad_s or (0.0, 10 * hover_speed_rad_s(vehicle)))[1]
     share = min(1e-3 * parts.mass_kg, 0.005)
     radius = vehicle.rotor_radius_m or 0.05
@@ -474,14 +477,11 @@ def sdf(vehicle: Vehicle) -> Exported:
     spread = np.zeros((3, 3))
     for place, m in [*((p * FLU, share) for p in parts.places), (off, body)]:
         spread += m * (place @ place * np.eye(3) - np.outer(place, place))
-    own = j - spread - 1e-7 * len(parts.places) * np.eye(3)
-    inertia = "".join(f"<i{a}{b}>{own['xyz'.index(a), 'xyz'.index(b)]:.9g}</i{a}{b}>"
-                      for a, b in ("xx", "yy", "zz", "xy", "xz", "yz"))  # fmt: skip
-    comments = _comments(left)
-    nl = "\n"
+    own = _in_flu(parts.inertia) - spread - 1e-7 * len(parts.places) * np.eye(3)
+    inertia = "".join(f"<i{name}>{value:.9g}</i{name}>" for name, value in in_entries(own).items())
     text = f"""<?xml version="1.0"?>
 <sdf version="1.9">
-{comments}  <model name={quoteattr(vehicle.name)}>
+{_comments(left)}  <model name={quoteattr(vehicle.name)}>
     <pose>0 0 0.3 0 0 0</pose>
     <link name="base_link">
       <inertial>
@@ -492,8 +492,8 @@ def sdf(vehicle: Vehicle) -> Exported:
       <collision name="body"><geometry><box><size>0.1 0.1 0.04</size></box></geometry></collision>
       <visual name="body"><geometry><box><size>0.1 0.1 0.04</size></box></geometry></visual>
     </link>
-{nl.join(links)}
-{nl.join(motors)}{gazebo_damping(vehicle)}
+{_LINE.join(links)}
+{_LINE.join(motors)}{gazebo_damping(vehicle)}
   </model>
 </sdf>
 """
@@ -511,17 +511,23 @@ def _gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     left = [*parts.left_out, *left_of_the_lowest_speed(parts)]
     if parts.drag[0]:
         left.append("rotor drag at the hubs: it acts at the centre of mass there, and with Physics.PYB_DRAG alone")
-    order, turned = _round_the_left(parts.places, vehicle.yaw_signs(), vehicle.name)
+    # Front left, rear left, rear right, front right. The yaw torque there is (−z0 + z1 − z2 + z3) about z up: 0 and 2
+    # turn counter-clockwise; of `RACE` clockwise.
+    order = in_corners(parts.places, ((1, -1), (-1, -1), (-1, 1), (1, 1)))
+    if order is None:
+        raise InputError(f"{vehicle.name}: gym-pybullet-drones wants four rotors in X shape")
+    senses = [int(vehicle.yaw_signs()[i]) for i in order]
+    if senses not in ([1, -1, 1, -1], [-1, 1, -1, 1]):
+        raise InputError(f"{vehicle.name}: gym-pybullet-drones wants rotors whose senses alternate around the vehicle")
+    turned = senses[0] < 0
     left.append(f"order of the rotors: its links 0 to 3 are rotors {', '.join(str(i + 1) for i in order)} here")
     if turned:
         left.append("senses of the rotors: they are those of its DroneModel.RACE, not CF2X; choose that one")
-    j = parts.inertia
-    left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: it has 9.8")
-    left.append(
-        "air without friction: it leaves on Bullet's damping, a deceleration of 0.04 (1 + |v|) v and so for turning"
-    )
-    hover = hover_speed_rad_s(vehicle)
-    limit = (parts.limits_rad_s or (0.0, 2 * hover))[1]
+    left += [
+        f"gravity of {vehicle.gravity_m_s2:g} m/s²: it has 9.8",
+        "air without friction: it leaves on Bullet's damping, a deceleration of 0.04 (1 + |v|) v and so for turning",
+    ]
+    limit = (parts.limits_rad_s or (0.0, 2 * hover_speed_rad_s(vehicle)))[1]
     lift = float(parts.thrust.sum() * limit**2 / (parts.mass_kg * vehicle.gravity_m_s2))
     # kf and km are by the square of turns a minute, the drag by the sum of rad/s.
     per_rpm = (2 * np.pi / 60) ** 2
@@ -549,11 +555,10 @@ def _gym_pybullet_drones(vehicle: Vehicle) -> Exported:
       <inertia ixx="0.0" ixy="0.0" ixz="0.0" iyy="0.0" iyz="0.0" izz="0.0"/></inertial>
   </link>
   <joint name="prop{k}_joint" type="fixed"><parent link="base_link"/><child link="prop{k}_link"/></joint>""")
-    comments = _comments(left)
-    nl = "\n"
+    j = parts.inertia
     text = f"""<?xml version="1.0" ?>
 <robot name={quoteattr(vehicle.name)}>
-{comments}  <properties {shown}/>
+{_comments(left)}  <properties {shown}/>
   <link name="base_link">
     <inertial><origin rpy="0 0 0" xyz="0 0 0"/><mass value="{parts.mass_kg:.9g}"/>
       <inertia ixx="{j[0, 0]:.9g}" ixy="0.0" ixz="0.0" iyy="{j[1, 1]:.9g}" iyz="0.0" izz="{j[2, 2]:.9g}"/></inertial>
@@ -561,7 +566,7 @@ def _gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     <collision><origin rpy="0 0 0" xyz="0 0 0"/>
       <geometry><cylinder radius="{arm:.6g}" length="0.03"/></geometry></collision>
   </link>
-{nl.join(links)}
+{_LINE.join(links)}
   <link name="center_of_mass_link">
     <inertial><origin rpy="0 0 0" xyz="0 0 0"/><mass value="0.0"/>
       <inertia ixx="0.0" ixy="0.0" ixz="0.0" iyy="0.0" iyz="0.0" izz="0.0"/></inertial>
@@ -570,22 +575,6 @@ def _gym_pybullet_drones(vehicle: Vehicle) -> Exported:
 </robot>
 """
     return Exported(text, "vehicle.urdf", tuple(left), rotor_order=tuple(order), mirrored=turned)
-
-
-def _round_the_left(places: np.ndarray, signs: np.ndarray, name: str) -> tuple[list[int], bool]:
-    """Rotors front left, rear left, rear right, front right, and whether their senses are the mirrored ones.
-
-    The yaw torque there is (−z0 + z1 − z2 + z3) about z up: 0 and 2 turn counter-clockwise; of `RACE` clockwise.
-    """
-    corners = {(int(np.sign(x)), int(np.sign(y))): i for i, (x, y, _) in enumerate(places)}
-    wanted = ((1, -1), (-1, -1), (-1, 1), (1, 1))
-    if set(corners) != set(wanted):
-        raise InputError(f"{name}: gym-pybullet-drones wants four rotors in X shape")
-    order = [corners[corner] for corner in wanted]
-    senses = [int(signs[i]) for i in order]
-    if senses not in ([1, -1, 1, -1], [-1, 1, -1, 1]):
-        raise InputError(f"{name}: gym-pybullet-drones wants rotors whose senses alternate around the vehicle")
-    return order, senses[0] < 0
 
 
 FORMS: dict[str, Callable[[Vehicle], Exported]] = {

@@ -86,11 +86,10 @@ def test_an_error_of_a_gyroscope_is_taken_off_the_reading():
 
 
 def test_the_files_are_there_where_there_is_something_to_write_and_gone_where_not(tmp_path):
-    paths = [tmp_path / n for n in NAMES]
-    write_files(replace(windy(), findings=(drag_finding(), WIND, sensor_error())), *paths)
+    write_files(replace(windy(), findings=(drag_finding(), WIND, sensor_error())), tmp_path)
     assert {"conditions.yaml", "instruments.yaml"} <= {p.name for p in tmp_path.iterdir()}
     assert read_instruments(tmp_path / "instruments.yaml").instruments[0].id == "gyro_error"
-    write_files(analysis(findings=[drag_finding()]), *paths)
+    write_files(analysis(findings=[drag_finding()]), tmp_path)
     assert {p.name for p in tmp_path.iterdir()} == {*NAMES, "ledger.json"}
 
 

@@ -145,12 +145,11 @@ def test_a_warning_is_on_the_page_on_the_screen_and_in_the_file(tmp_path, monkey
     (warning,) = verdict.warnings
     folder = write_set(recordings, tmp_path)
 
-    def deliver(folder, target, quiet, series=False):
+    def deliver(folder, target, series=False):
         target.mkdir()
-        names = ("verdict.json", "report.html", "improved_vehicle.yaml")
-        return write_files(analysis, *(target / name for name in names))
+        return write_files(analysis, target)
 
-    monkeypatch.setattr(verdicts, "deliver_set", deliver)
+    monkeypatch.setattr(verdicts, "write_verdict", deliver)
     said = answer("verdict", folder, "-q", "-o", tmp_path / "out")
     assert f"! {warning}" in said.splitlines() and verdict.sentence in said.splitlines()
     assert said.splitlines()[0] == verdict.basis.sentence

@@ -199,13 +199,12 @@ def test_nothing_to_compare_is_one_sentence():
 
 
 def test_the_files_of_a_bench_hold_its_model(tmp_path):
-    paths = [tmp_path / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-    verdict = deliver(bench_set(lambda load: 1.03 * load + np.array([0.05, 0.0, -0.05])), *paths)
+    verdict = deliver(bench_set(lambda load: 1.03 * load + np.array([0.05, 0.0, -0.05])), tmp_path)
     assert verdict.kind == "bench" and verdict.verdict == "explained"
     assert {e.id for e in verdict.effects if e.status == "established"} == {"tare_offset"}
     errors = verdict.channels["force_x"].rmse.held_out
     assert errors.after < 0.012 < 0.05 < errors.before
-    written = read_vehicle(paths[2])
+    written = read_vehicle(tmp_path / "improved_vehicle.yaml")
     assert written.reading_gain == pytest.approx((1.03, 1.03, 1.03), abs=0.002)
     assert written.effects == ()
     errors_found = read_instruments(tmp_path / "instruments.yaml").instruments

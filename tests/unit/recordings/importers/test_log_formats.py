@@ -402,7 +402,7 @@ def test_verdict_takes_the_folder_of_a_bag_for_a_log(bag, tmp_path: Path, monkey
     made = tmp_path / "answer" / "flight" / "vehicle.yaml"
     words = ["verdict", "flight", "--like", "five-inch", "--mass-kg", "0.7", "-o", "answer"]
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("rotorid.cli.verdicts.deliver_set", lambda *_: (_ for _ in ()).throw(InputError("made")))
+    monkeypatch.setattr("rotorid.cli.verdicts.write_verdict", lambda *_: (_ for _ in ()).throw(InputError("made")))
     assert invoke(*words).output.endswith("rotorid: made\n") and made.is_file()
 
 

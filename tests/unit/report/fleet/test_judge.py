@@ -30,10 +30,10 @@ def told(monkeypatch, tmp_path: Path) -> Path:
     calls = tmp_path / "calls"
     calls.touch()
 
-    def analysed(folder: Path, verdict: Path, page: Path, improved: Path) -> None:
+    def analysed(folder: Path, target: Path) -> None:
         with open(calls, "a", encoding="utf-8") as file:
             file.write(folder.name + "\n")
-        verdict.write_text(json.dumps({"set": folder.name}))
+        (target / "verdict.json").write_text(json.dumps({"set": folder.name}))
         if folder.name == "b-wrong":
             raise InputError("run.csv: line 3 is not a number")
         if folder.name == "c-crashes":
@@ -42,8 +42,8 @@ def told(monkeypatch, tmp_path: Path) -> Path:
             os.kill(os.getpid(), signal.SIGKILL)
         if folder.name == "f-full":
             raise OSError(28, "No space left on device")
-        page.write_text("page")
-        improved.write_text("name: x\n")
+        (target / "report.html").write_text("page")
+        (target / "improved_vehicle.yaml").write_text("name: x\n")
 
     def read(folder: Path) -> Path:
         if folder.name == "g-torn":
@@ -121,6 +121,6 @@ def test_a_fleet_says_byte_for_byte_what_each_set_says_by_itself(tmp_path: Path)
     fleet.judge_sets(folders, "c0de", tmp_path / "out", tmp_path / "memory")
     for folder in folders:
         alone = tmp_path / "alone" / folder.name
-        deliver(read_set(folder), *(alone / name for name in fleet.FILES[:3]))
+        deliver(read_set(folder), alone)
         for name in fleet.FILES:
             assert (tmp_path / "out" / folder.name / name).read_bytes() == (alone / name).read_bytes(), name

@@ -133,7 +133,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("page")
     made = analysis(findings=[drag_finding()], dash=True)
     made = replace(made, recordings=replace(made.recordings, name=NASTY), notes=(NASTY,))
-    write_files(made, folder / "verdict.json", folder / "report.html", folder / "v.yaml")
+    write_files(made, folder)
     return folder / "report.html"
 
 
