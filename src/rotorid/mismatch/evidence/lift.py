@@ -514,7 +514,12 @@ def chain_of_lift(
         if found.one_of_two:
             alternatives[late.id] = (_of_stage(LAG + DELAY - found.late_by).id,)
     fit = SpeedFit(
-        tuple(chain), np.array(values), np.zeros(1), 0.0, np.diag(variances) if chain else np.zeros((0, 0)), holds=False
+        tuple(chain),
+        np.array(values),
+        {"late": 0.0},
+        0.0,
+        np.diag(variances) if chain else np.zeros((0, 0)),
+        holds=False,
     )
     every = {key: alternatives.get(key, ()) for key, _ in chain}
     known = {"e_u": found.elasticity, "e_V": found.voltage, "tau": found.lag_s}

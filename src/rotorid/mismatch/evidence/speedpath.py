@@ -15,14 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import f as f_distribution
 
 from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import CURVE, DELAY, LAG, LIMIT, SpeedForm, SpeedPath
 from rotorid.effects.delay import shifted
 from rotorid.effects.loading import weights_of_four
 from rotorid.mismatch.evidence.motion import Segment
-from rotorid.mismatch.evidence.regression import at_least, autoregression, quadratic_form
+from rotorid.mismatch.evidence.regression import at_least, autoregression, hotelling, quadratic_form
 from rotorid.recordings.signal import kernels
 from rotorid.recordings.signal.kernels import causal
 from rotorid.steps import step
@@ -60,14 +59,14 @@ class SpeedFit:
     chain: Chain
     values: np.ndarray
     """Parameters of every form, in order."""
-    beside: np.ndarray
-    """What the recording leaves unknown of the path itself (`PathProblem.unknown`); of flights the shift in time, s."""
+    beside: Mapping[str, float]
+    """What the recording leaves unknown of the path itself (`PathProblem.unknown`); of flights a shift in time, s."""
     cost: float
     covariance: np.ndarray | None = None
     inflation: float = 1.0
     holds: bool = True
     """Whether commands hold from sample to sample; else they are smooth, and recorded now and then."""
-    beside_sd: np.ndarray | None = None
+    beside_sd: Mapping[str, float] = field(default_factory=dict)
     blocks: int = 2
     """Blocks that the covariance is made of."""
 
@@ -142,7 +141,7 @@ class CommandChain(NamedTuple):
         if chain is None:
             chain, values = fit.chain, fit.values
         full = self.full_speed, self.full_voltage
-        return self.scale * commanded_path(segment, chain, values, float(fit.beside[0]), *full, fit.holds)
+        return self.scale * commanded_path(segment, chain, values, fit.beside["late"], *full, fit.holds)
 
 
 def commanded_path(
@@ -195,14 +194,17 @@ def moved(path: SpeedPath, values: np.ndarray) -> np.ndarray:
 class PathProblem(ABC):
     """Residuals of a chain on what is fitted, whitened. A kind of recording says what the response is.
 
-    Next to the forms' parameters stands what nobody recorded of the path itself, the same for every chain.
+    Next to the forms' parameters stands what nobody recorded of the path itself.
     """
 
-    unknown: np.ndarray
-    """One-sigma, lower and upper bound of each such number, (k, 3); each is nothing where nothing is unknown."""
     coloured = True
     """Whether residuals are whitened by their colour; else by their size alone: what they have in common is what the
     chain lacks, no noise, and it takes nothing off what a form gains."""
+
+    rich = True
+    """Whether noise is learnt at once from a rich chain, one form of every id, and with it whether commands hold. Else
+    it is learnt from the best chain so far, as smooth commands make it: those that hold make no lateness finer than
+    their samples, in which a fit finds no slope."""
 
     def __init__(
         self, commands: list[tuple[np.ndarray, np.ndarray]], rate_hz: float, full_speed: float, scale: np.ndarray
@@ -214,8 +216,12 @@ class PathProblem(ABC):
         self.holds = True
 
     @abstractmethod
+    def unknown(self, chain: Chain) -> Mapping[str, tuple[float, float, float]]:
+        """To each such number its one-sigma, lower and upper bound; at nothing the path is as it was recorded."""
+
+    @abstractmethod
     def raw(self, chain: Chain, values, beside) -> list[np.ndarray]:
-        """Residual of every stretch, (n, channels), unwhitened."""
+        """Residual of every stretch, (n, channels), unwhitened; `beside` are the numbers of `unknown`."""
 
     @abstractmethod
     def blocks(self, sizes: Sequence[int]) -> list[list[np.ndarray]]:
@@ -224,9 +230,10 @@ class PathProblem(ABC):
         `sizes` are the rows of every stretch.
         """
 
-    @abstractmethod
-    def late_s(self, fit: SpeedFit) -> float:
-        """What is unknown of the time by which commands arrive, s: a delay takes it back."""
+    def beside(self, chain: Chain, like: SpeedFit | None = None) -> np.ndarray:
+        """What is unknown of a chain's path as a fit has it, nothing where that does not say."""
+        known = {} if like is None else like.beside
+        return np.array([known.get(name, 0.0) for name in self.unknown(chain)])
 
     def noticed_s(self, form: SpeedForm) -> float:
         """Time by which rotors must be late by a form to be called so: between two samples nobody recorded anything."""
@@ -242,14 +249,18 @@ class PathProblem(ABC):
         parts = self.raw(chain, values, beside)
         return [np.stack([causal(f, p[:, j]) for j, f in enumerate(self.filters)], axis=1)[longest:] for p in parts]
 
+    def left_by(self, fit: SpeedFit) -> list[np.ndarray]:
+        """Residual of every stretch that a fit leaves, (n, channels), unwhitened."""
+        return self.raw(fit.chain, fit.values, self.beside(fit.chain, fit))
+
     def left(self, chain: Chain, values, beside) -> float:
         """Whitened squares that a chain leaves."""
         return sum(float((w**2).sum()) for w in self.whitened(chain, values, beside))
 
     def learn_noise(self, fit: SpeedFit) -> None:
         """Take the residual of a rich chain as the noise."""
-        parts = self.raw(fit.chain, fit.values, fit.beside)
-        if self.coloured:
+        parts = self.left_by(fit)
+        if self.coloured and (self.rich or fit.chain):  # what no form explains yet is no noise
             self.filters = [autoregression([p[:, j] for p in parts]) for j in range(parts[0].shape[1])]
         else:
             self.filters = [np.array([1.0 / s]) for s in self.noise_of(parts)]
@@ -263,15 +274,18 @@ class PathProblem(ABC):
         """The fit of rotors that follow at once."""
         return self.fit((), np.zeros(0))
 
-    def fit(self, chain: Chain, start: np.ndarray, beside: np.ndarray | None = None) -> SpeedFit:
-        """Nonlinear least squares of a chain from a start; bounded by the forms' physical bounds."""
-        sd, low, high = self.unknown.T
+    def fit(self, chain: Chain, start: np.ndarray, like: SpeedFit | None = None) -> SpeedFit:
+        """Nonlinear least squares of a chain from a start; bounded by the forms' physical bounds.
+
+        What is unknown of the path starts as another fit has it.
+        """
+        sd, low, high = np.array(list(self.unknown(chain).values())).reshape(-1, 3).T
         own = len(start)
         low = np.append([x for _, f in chain for x in self.low_of(f)], low)
         high = np.append([p.high for _, f in chain for p in f.parameters], high)
-        x0 = np.append(start, np.zeros(len(sd)) if beside is None else beside)
+        x0 = np.append(start, self.beside(chain, like))
         if not len(x0):
-            return SpeedFit(chain, x0, x0, self.left(chain, x0, x0), holds=self.holds)
+            return SpeedFit(chain, x0, {}, self.left(chain, x0, x0), holds=self.holds)
         x0 = np.clip(x0, low + 1e-9, high - 1e-9)
         scale = np.where(np.abs(x0) > 1e-3, np.abs(x0), 0.02)
         scale[own:] = np.where(np.isfinite(sd), sd, 0.1)
@@ -283,12 +297,14 @@ class PathProblem(ABC):
         found = least_squares(
             function, x0, bounds=(low, high), x_scale=scale, diff_step=1e-4, max_nfev=25, ftol=1e-5, xtol=1e-5
         )
-        return SpeedFit(chain, found.x[:own], found.x[own:], 2 * found.cost, holds=self.holds)
+        beside = dict(zip(self.unknown(chain), map(float, found.x[own:]), strict=True))
+        return SpeedFit(chain, found.x[:own], beside, 2 * found.cost, holds=self.holds)
 
     def with_covariance(self, fit: SpeedFit) -> SpeedFit:
         """The fit with a covariance that is robust against what whitening left, and allows for few blocks."""
-        x, own, sd = np.append(fit.values, fit.beside), len(fit.values), self.unknown[:, 0]
-        base = self.whitened(fit.chain, fit.values, fit.beside)
+        x, own = np.append(fit.values, self.beside(fit.chain, fit)), len(fit.values)
+        sd = np.array([one_sigma for one_sigma, *_ in self.unknown(fit.chain).values()])
+        base = self.whitened(fit.chain, x[:own], x[own:])
         least = np.append(np.full(own, 1e-2), np.where(np.isfinite(sd), sd, 1e-2))
         columns = []
         for j in range(len(x)):
@@ -298,7 +314,7 @@ class PathProblem(ABC):
             moved = self.whitened(fit.chain, up[:own], up[own:])
             columns.append(np.concatenate([(b - a) / step for a, b in zip(base, moved, strict=True)]))
         if not columns:
-            return replace(fit, covariance=np.zeros((0, 0)), beside_sd=np.zeros(0))
+            return replace(fit, covariance=np.zeros((0, 0)))
         jacobian, left = np.stack(columns, axis=-1), np.concatenate(base)
         gram, scores = np.zeros((len(x), len(x))), []
         for block in (b for group in self.blocks([len(w) for w in base]) for b in group):
@@ -318,7 +334,7 @@ class PathProblem(ABC):
             fit,
             covariance=covariance[:own, :own],
             inflation=max(1.0, float(np.median(ratio))) if own and self.coloured else 1.0,
-            beside_sd=np.sqrt(np.diag(covariance)[own:]),
+            beside_sd=dict(zip(fit.beside, map(float, np.sqrt(np.diag(covariance)[own:])), strict=True)),
             blocks=count,
         )
 
@@ -336,7 +352,6 @@ class MeasuredSpeed(PathProblem):
             np.full(rotors, max(float(spread), 1e-9)),
         )
         self.segments, self.full_voltage = segments, full_voltage
-        self.unknown = 0.5 / self.rate_hz * np.array([[1.0, -2.0, 2.0]])
         self._last: dict[int, LastSteps] = {id(s): {} for s in segments}
 
     def raw(self, chain: Chain, values, beside) -> list[np.ndarray]:
@@ -347,9 +362,10 @@ class MeasuredSpeed(PathProblem):
             for s in self.segments
         ]
 
-    def late_s(self, fit: SpeedFit) -> float:
-        """The shift in time."""
-        return float(fit.beside[0])
+    def unknown(self, chain: Chain) -> Mapping[str, tuple[float, float, float]]:
+        """A shift in time, s."""
+        half = 0.5 / self.rate_hz
+        return {"late": (half, -2.0 * half, 2.0 * half)}
 
     def blocks(self, sizes: Sequence[int]) -> list[list[np.ndarray]]:
         """Seconds of each stretch."""
@@ -388,11 +404,8 @@ class SpeedSearch:
 
     def best_fit(self, chain: Chain, base: SpeedFit, added: SpeedForm) -> SpeedFit:
         """The chain of `base` plus one form, from the one of the form's starts that leaves least."""
-
-        def left(start: np.ndarray) -> float:
-            return self.problem.left(chain, np.append(base.values, start), base.beside)
-
-        return self.problem.fit(chain, np.append(base.values, min(self.starts(added), key=left)), base.beside)
+        beside, starts = self.problem.beside(chain, base), [np.append(base.values, s) for s in self.starts(added)]
+        return self.problem.fit(chain, min(starts, key=lambda start: self.problem.left(chain, start, beside)), base)
 
     def starts(self, form: SpeedForm) -> list[np.ndarray]:
         """Starting values of a form: of a limit shares of the way from the usual command to the outermost (nothing acts
@@ -418,11 +431,34 @@ class SpeedSearch:
         for key, form in rich.items():
             richer = self.best_fit((*fit.chain, (key, form)), fit, form)
             fit = richer if richer.cost < fit.cost else fit  # a start may be far from all that is there
-        self.problem.holds = not self.problem.holds
-        other = self.problem.fit(fit.chain, fit.values, fit.beside)
-        fit = other if other.cost <= _PLAINLY_LESS * fit.cost else fit
-        self.problem.holds = fit.holds
+        better = self.held_or_smooth(fit)
+        self.problem.holds = better.holds
+        self.problem.learn_noise(better)
+
+    def relearnt(self, fit: SpeedFit) -> SpeedFit:
+        """The fit once more, whitened by its own residual, where no rich chain says what noise is."""
+        if self.problem.rich:
+            return fit
         self.problem.learn_noise(fit)
+        return self.problem.fit(fit.chain, fit.values, fit)
+
+    def p_of(self, fit: SpeedFit, key: str, p: float) -> float:
+        """p-value `p` of an id in a fit; where no rich chain says what noise is, by the fit's own residual."""
+        if self.problem.rich:
+            return p
+        before = self.problem.filters
+        own = self.problem.with_covariance(self.relearnt(fit))
+        self.problem.filters = before
+        where = own.slice_of(key)
+        away = own.values[where] - self.neutral(own.of(key)[0])
+        return hotelling(quadratic_form(away, own.covariance[where, where]), len(away), own.blocks)
+
+    def held_or_smooth(self, fit: SpeedFit) -> SpeedFit:
+        """The fit with commands as they are taken, or as the other kind where that leaves plainly less."""
+        self.problem.holds = not fit.holds
+        other = self.problem.fit(fit.chain, fit.values, fit)
+        self.problem.holds = fit.holds
+        return other if other.cost <= _PLAINLY_LESS * fit.cost else fit
 
     def size(self, fit: SpeedFit, key: str) -> float:
         """Change that an id makes in units of the residual's own noise, strongest tenth of the seconds.
@@ -430,7 +466,7 @@ class SpeedSearch:
         Of a limit, which acts where it is reached alone, the strongest second.
         """
         less = fit.without(key)
-        with_it, without = (self.problem.raw(f.chain, f.values, f.beside) for f in (fit, less))
+        with_it, without = self.problem.left_by(fit), self.problem.left_by(less)
         change = np.concatenate(without) - np.concatenate(with_it)
         noise = np.maximum(self.problem.noise_of(with_it), 1e-12)
         quantile = 1.0 if fit.of(key)[0].stage == LIMIT else 0.9
@@ -447,10 +483,7 @@ class SpeedSearch:
         # What the fit gains and what its parameters are sure of must agree: the shift in time bends the first.
         away = fit.values[own] - self.neutral(fit.of(key)[0])
         sure = gain if fit.covariance is None else quadratic_form(away, fit.covariance[own, own])
-        # Hotelling's T² over blocks.
-        free = max(fit.blocks - count, 1)
-        p = f_distribution.sf(max(min(gain, sure), 0.0) * free / (count * max(fit.blocks - 1, 1)), count, free)
-        return float(p), gain - COST_PER_PARAMETER * count, inflation
+        return hotelling(min(gain, sure), count, fit.blocks), gain - COST_PER_PARAMETER * count, inflation
 
     def neutral(self, form: SpeedForm) -> np.ndarray:
         """Parameter values that change nothing; of a limit, the outermost command."""
@@ -461,10 +494,12 @@ class SpeedSearch:
 
     def run(self) -> SpeedResult:
         """The whole search."""
-        self.rich_noise()
+        if self.problem.rich:
+            self.rich_noise()
         current = self.problem.nothing()
         dropped: dict[str, str] = {}
         for _ in range(5):
+            current = self.relearnt(current)
             taken = {k for k, _ in current.chain} | set(dropped)
             others = {
                 (key, form): self.problem.with_covariance(self.best_fit((*current.chain, (key, form)), current, form))
@@ -480,7 +515,7 @@ class SpeedSearch:
             for score, p, key, fit in options:
                 if score <= 0:
                     break
-                if p > ENTER_P or self.negligible(fit, key):
+                if self.p_of(fit, key, p) > ENTER_P or self.negligible(fit, key):
                     continue
                 size = self.size(fit, key)
                 if size < SMALLEST_SIZE:
@@ -494,13 +529,16 @@ class SpeedSearch:
             if not grown:
                 break
         current, bases = self._pruned(current, dropped)
+        if not self.problem.rich and (other := self.held_or_smooth(current)) is not current:
+            self.problem.holds = other.holds
+            current, bases = self._pruned(other, dropped)
         p_values, alternatives, fewer = {}, {}, {}
         for key, _ in current.chain:
             base = bases[key]
             fewer[key] = self.problem.with_covariance(base) if base.chain else base
             p_values[key] = self.judge(base, current, key)[0]
             alternatives[key] = self._alternatives(current, base, key)
-        noise = self.problem.noise_of(self.problem.raw(current.chain, current.values, current.beside))
+        noise = self.problem.noise_of(self.problem.left_by(current))
         return SpeedResult(current, p_values, alternatives, dropped, noise, self._lag_alone(current), fewer)
 
     def _lag_alone(self, fit: SpeedFit) -> SpeedFit | None:
@@ -540,31 +578,31 @@ class SpeedSearch:
     def negligible(self, fit: SpeedFit, key: str) -> bool:
         """Whether an id's parameters are all closer to changing nothing than their own limits.
 
-        Of a lag or a delay, than half a sample: from one command to the next nobody recorded what happened. The shift
-        is a delay, too: what one takes back of the other is none.
+        Of a lag or a delay, than half a sample: from one command to the next nobody recorded what happened. What is
+        unknown of when a command arrives is a delay, too: what one takes back of the other is none.
         """
         form, values = fit.of(key)
         delays = form.stage == DELAY
         least = self.problem.noticed_s(form)
-        away = values + self.problem.late_s(fit) if delays else values
+        away = values + fit.beside.get("late", 0.0) if delays else values
         limits = [max(p.negligible, least) for p in form.parameters]
         return all(abs(v - n) < limit for v, n, limit in zip(away, form.neutral, limits, strict=True))
 
     def _without(self, fit: SpeedFit, key: str) -> SpeedFit:
         less = fit.without(key)
-        return self.problem.fit(less.chain, less.values, less.beside)
+        return self.problem.fit(less.chain, less.values, fit)
 
     @step("other forms")
-    def _better_forms(self, fit: SpeedFit, new: str, current: SpeedFit, others) -> SpeedFit:
+    def _better_forms(self, fit: SpeedFit, new: str = "", current: SpeedFit | None = None, others=None) -> SpeedFit:
         """Try the other forms of each id in the chain; of those with which rotors follow commands the cheapest for
         its parameters stays.
 
-        `others` are fits of `current` plus a form, of which that of the id `new` is `fit`.
+        `others` are fits of `current` plus a form, of which that of the id `new`, if any, is `fit`.
         """
         for key in [k for k, _ in fit.chain]:
             known = key == new and fit.chain[:-1] == current.chain
             base = current if known else self._without(fit, key)
-            best = fit
+            best = fit if fit.covariance is not None else self.problem.with_covariance(fit)
             for other, form in self.forms:
                 if other != key or form is fit.of(key)[0]:
                     continue
@@ -582,6 +620,7 @@ class SpeedSearch:
     def _pruned(self, fit: SpeedFit, dropped: dict[str, str]) -> tuple[SpeedFit, dict[str, SpeedFit]]:
         """The chain less what does not hold, and to each id that stays the chain fitted without it."""
         while True:
+            fit = self.relearnt(fit)
             fit = fit if fit.covariance is not None else self.problem.with_covariance(fit)
             bases = {key: self._without(fit, key) for key, _ in fit.chain}
             failing = {}
@@ -599,7 +638,7 @@ class SpeedSearch:
                 dropped[worst] = "it is too slight to matter"
             else:
                 dropped[worst] = f"p = {failing[worst]:.2g} given the others"
-            fit = bases[worst]
+            fit = self._better_forms(bases[worst])
 
     @step("what else would do")
     def _alternatives(self, fit: SpeedFit, base: SpeedFit, key: str) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ The search is that of flights (`rotorid.mismatch.evidence.speedpath`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -25,7 +25,6 @@ from rotorid.mismatch.evidence.speedpath import (
     COST_PER_PARAMETER,
     Chain,
     PathProblem,
-    SpeedFit,
     SpeedResult,
     SpeedSearch,
 )
@@ -45,6 +44,8 @@ _RATE_HZ = 30.0
 _SUB_SAMPLE = 1.2
 """Samples by which the clocks of a command and a wrench may lie apart: no delay."""
 _LEAST_BLOCKS, _MOST_BLOCKS, _STEADY_BLOCKS = 12, 400, 40
+_FREE_SPEED = (np.inf, -0.8, 4.0)
+"""One-sigma and bounds of a full speed that nobody states, as a share of the one that it is taken for."""
 _FINER = 4
 """Steps of a chain that takes time to one sample."""
 
@@ -136,9 +137,11 @@ def between(values: np.ndarray, finer: int) -> np.ndarray:
 class StandPath(PathProblem):
     """Residuals of a chain on the stretches of a stand that are fitted.
 
-    Unknown are the full speed where nobody states it, as a share of the one that it is taken for, and in what is no
-    list of steady points the moments of `unknown_courses`.
+    Unknown are the full speed where nobody states it, as a share of the one that it is taken for, and what a chain that
+    takes time sees of a command between its samples (`unknown_courses`).
     """
+
+    rich = False
 
     def __init__(self, setup: PreparedInstrument, others: list | None = None, holds: bool = False):
         """`others` are (form, values) of effects of the reading found so far.
@@ -167,16 +170,22 @@ class StandPath(PathProblem):
             np.ones(setup.vehicle.rotor_count if self.measured else len(self.channels)),
         )
         self.holds = holds
-        most_doubt = 3.0  # Standard deviations by which a command may differ from the curve through its samples.
-        courses = np.zeros(0) if setup.steady_points else unknown_courses(1.0 / rate_hz)
-        self.unknown = np.array(
-            [*([[np.inf, -0.8, 4.0]] if self.scaled else []), *([x, -most_doubt * x, most_doubt * x] for x in courses)]
-        ).reshape(-1, 3)
         if not self.measured:
             self.leave_to_rotors()
-        self.filters = [
-            np.array([1.0 / s]) for s in self.noise_of(self.raw((), np.zeros(0), np.zeros(len(self.unknown))))
-        ]
+        spread = self.noise_of(self.raw((), np.zeros(0), self.beside(())))
+        self.filters = [np.array([1.0 / s]) for s in spread]
+
+    def unknown(self, chain: Chain) -> Mapping[str, tuple[float, float, float]]:
+        """Share that the full speed is larger, then moments of the course between samples: late (s), spread (s²).
+
+        A delay in the chain is the first moment already.
+        """
+        most_doubt = 3.0  # Standard deviations by which a command may differ from the curve through its samples.
+        moments = dict(zip(("late", "spread"), unknown_courses(1.0 / self.rate_hz), strict=True))
+        if any(form.stage == DELAY for _, form in chain):
+            del moments["late"]
+        courses = {name: (sd, -most_doubt * sd, most_doubt * sd) for name, sd in moments.items()}
+        return {**({"full": _FREE_SPEED} if self.scaled else {}), **(courses if _takes_time(chain) else {})}
 
     def start_of(self, loading: Loading, finer: int) -> _Commanded:
         """What a chain starts from on a stretch of the setup; remembered, for it is the same in every evaluation."""
@@ -208,10 +217,6 @@ class StandPath(PathProblem):
             self._made[key] = speed if np.isfinite(speed).all() else np.nan_to_num(speed)
         return self._made[key]
 
-    def full_speed_of(self, beside: np.ndarray) -> float:
-        """The full speed, rad/s."""
-        return self.full_speed * (1.0 + beside[0]) if self.scaled else self.full_speed
-
     def speed(self, loading: Loading, chain: Chain, values, beside) -> np.ndarray:
         """Rotor speeds (n, k), rad/s, that a chain makes of a stretch's commands; they scale with the full speed."""
         at, own = 0, {}
@@ -221,7 +226,7 @@ class StandPath(PathProblem):
         finer = _FINER if _takes_time(chain) else 1
         speed = self.made(loading, tuple(path), tuple(float(v) for key, _ in path for v in own[key]), finer)
         speed = moved_between_samples(speed, np.asarray(beside)[int(self.scaled) :], loading.dt_s, finer)
-        return speed[:, self.start_of(loading, finer).which] * (self.full_speed_of(beside) / self.full_speed)
+        return speed[:, self.start_of(loading, finer).which] * (1.0 + (beside[0] if self.scaled else 0.0))
 
     def leave_to_rotors(self) -> None:
         """Take off the readings that are fitted what effects add at any speed alike, and off the loads the rotors' own.
@@ -259,10 +264,6 @@ class StandPath(PathProblem):
             out += [rows[p] for p in pieces_of(moved, self.average)]
         mean = 0.0 if self.measured else np.concatenate(out).mean(axis=0)
         return [p - mean for p in out]
-
-    def late_s(self, fit: SpeedFit) -> float:
-        """By how much commands are late between their samples."""
-        return 0.0 if self.setup.steady_points else float(fit.beside[int(self.scaled)])
 
     def noticed_s(self, form: SpeedForm) -> float:
         """Half a sample; of a delay between a command and a wrench a little more than one."""
@@ -330,35 +331,35 @@ def find_chain(setup: PreparedInstrument, others: list | None = None) -> ChainRe
     search = SpeedSearch(problem, _candidates(setup))
     result = search.run()
     if not problem.measured:
-        result = _without_mere_scale(search, result)
+        result = _without_mere_scale(problem, result)
         more = {key: _reading_alternatives(problem, result, key) for key, _ in result.fit.chain}
         result = replace(result, alternatives={k: (*result.alternatives[k], *own) for k, own in more.items()})
     rotors = range(setup.vehicle.rotor_count)
     channels = tuple(f"rotor_speed_{i + 1}" for i in rotors) if problem.measured else ("force_z",)
-    sd = problem.full_speed * float(result.fit.beside_sd[0]) if problem.scaled else 0.0
+    share, doubt = (of["full"] if problem.scaled else 0.0 for of in (result.fit.beside, result.fit.beside_sd))
     findings = tuple(path_findings(result, channels))
-    return ChainResult(result, problem.full_speed_of(result.fit.beside), sd, findings)
+    return ChainResult(result, problem.full_speed * (1.0 + share), problem.full_speed * doubt, findings)
 
 
-def _without_mere_scale(search: SpeedSearch, result: SpeedResult) -> SpeedResult:
-    """The result without forms that only say what another thrust coefficient would.
+def _without_mere_scale(problem: StandPath, result: SpeedResult) -> SpeedResult:
+    """The result without forms that only say what another thrust coefficient would, the others as that leaves them.
 
     Where no speed is measured, speeds that are all a share higher than commanded are a thrust that is larger: a value
     that is wrong, and no curve of the throttle.
     """
-    problem = search.problem
     if problem.scaled:
         return result
     scaled = copy(problem)
-    scaled.scaled, scaled.unknown = True, np.vstack([[np.inf, -0.8, 4.0], problem.unknown])
+    scaled.scaled = True
     for key, form in result.fit.chain:
         if form.stage in (CURVE, SUPPLY):
             rest = result.without[key]
-            fit = scaled.fit(rest.chain, rest.values, np.append(0.0, rest.beside))
+            fit = scaled.fit(rest.chain, rest.values, rest)
             if fit.cost < result.fit.cost + COST_PER_PARAMETER * (len(form.parameters) - 1):
-                forms = [(k, f) for k, f in search.forms if k != key]
-                again = _without_mere_scale(search, SpeedSearch(problem, forms).run())
-                return replace(again, dropped={**again.dropped, key: "another thrust coefficient explains as much"})
+                fit = scaled.with_covariance(fit)
+                dropped = {**result.dropped, key: "another thrust coefficient explains as much"}
+                fewer = {other: fit.without(other) for other, _ in fit.chain}
+                return _without_mere_scale(problem, replace(result, fit=fit, without=fewer, dropped=dropped))
     return result
 
 
@@ -366,9 +367,10 @@ def _reading_alternatives(problem: StandPath, result: SpeedResult, key: str) -> 
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
     rest, most = result.without[key], result.fit.cost + rules.ELSEWHERE["squares"]
-    known, own = np.append(rest.values, rest.beside), len(rest.values)
-    low = np.append([x for _, f in rest.chain for x in problem.low_of(f)], problem.unknown[:, 1])
-    high = np.append([p.high for _, f in rest.chain for p in f.parameters], problem.unknown[:, 2])
+    known, own = np.append(rest.values, problem.beside(rest.chain, rest)), len(rest.values)
+    free = np.array(list(problem.unknown(rest.chain).values())).reshape(-1, 3)
+    low = np.append([x for _, f in rest.chain for x in problem.low_of(f)], free[:, 1])
+    high = np.append([p.high for _, f in rest.chain for p in f.parameters], free[:, 2])
 
     def explains(form: Form, value: float) -> bool:
         first, with_it = form.parameters[0], copy(problem)
@@ -402,7 +404,7 @@ def moved(setup: PreparedInstrument, found: ChainResult) -> tuple[Loading, ...]:
     problem = StandPath(setup, holds=fit.holds)
     out = []
     for x in setup.loadings:
-        speed = problem.speed(x, fit.chain, fit.values, fit.beside)
+        speed = problem.speed(x, fit.chain, fit.values, problem.beside(fit.chain, fit))
         command = x.command * (found.full_speed / problem.full_speed)
         out.append(loaded_by(replace(x, command=command, motion=with_speed(x.motion, speed)), setup.vehicle))
     return tuple(out)
@@ -412,9 +414,8 @@ def speed_traces(setup: PreparedInstrument, found: ChainResult) -> tuple[Channel
     """Measured less commanded and less modelled speed of every rotor, where both are recorded."""
     fit = found.result.fit
     problem = StandPath(setup, holds=fit.holds)
-    scale = np.where(np.arange(len(fit.beside)) < int(problem.scaled), fit.beside, 0.0)
-    believed = problem.raw((), np.zeros(0), scale, setup.loadings)
-    left = problem.raw(fit.chain, fit.values, fit.beside, setup.loadings)
+    believed = problem.raw((), np.zeros(0), problem.beside((), fit), setup.loadings)
+    left = problem.raw(fit.chain, fit.values, problem.beside(fit.chain, fit), setup.loadings)
     out = []
     for x, a, b in zip(setup.loadings, believed, left, strict=True):
         times, a, b = averaged(x.time_s, setup.average), averaged(a, setup.average), averaged(b, setup.average)

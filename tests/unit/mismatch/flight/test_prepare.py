@@ -263,7 +263,7 @@ def chain_of(effect_id: str, name: str, values, sd: float = 1e-4) -> CommandChai
     """A chain of one form, its values known to `sd`."""
     made = form(effect_id, name)
     known = sd**2 * np.eye(len(made.parameters))
-    fit = SpeedFit(((effect_id, made),), np.array(values, float), np.zeros(1), 0.0, covariance=known)
+    fit = SpeedFit(((effect_id, made),), np.array(values, float), {"late": 0.0}, 0.0, covariance=known)
     return CommandChain(SpeedResult(fit, {}, {}), 2500.0, None)
 
 

@@ -142,7 +142,7 @@ def test_of_commands_that_are_answers_the_mean_over_seconds_counts(lifted, turne
     time_s = np.arange(0.0, 12.0, 0.01)[:, None]
     together, apart = 0.2 * np.sin(4 * np.pi * time_s), 0.1 * np.sin(6 * np.pi * time_s) * np.array([1, -1, 1, -1])
     trim = np.array([0.04, 0.0, 0.0, -0.04])
-    result = SpeedResult(SpeedFit((), np.zeros(0), np.zeros(1), 0.0), {}, {}, lifted_by_commands=lifted)
+    result = SpeedResult(SpeedFit((), np.zeros(0), {"late": 0.0}, 0.0), {}, {}, lifted_by_commands=lifted)
     chain = CommandChain(replace(result, turned_by_commands=turned), 1.0, None)
     found = caused(np.sqrt(1.0 + trim + together + apart), 0.01, chain) ** 2
     expected = 1.0 + trim + lifted * together + turned * apart
