@@ -14,9 +14,9 @@ from rotorid.recordings.vehicle import Derivative, Vehicle
 from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES, symbol_of, table_of
 
 _OF_STATE = QUANTITIES[:7]
-"""What a tool's step knows of the vehicle: 1, velocity through the air, body rates."""
-_SIGNS = np.array([1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
-"""Of `_OF_STATE` in forward-left-up axes; those of the channels are the last six."""
+"""What every tool's step knows of the vehicle: 1, velocity through the air, body rates."""
+_SIGNS = np.array([1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0, *[1.0] * 5])
+"""Of QUANTITIES in forward-left-up axes; those of the channels are the second to seventh."""
 _MOST_SHOWN = 6
 ROTORPY_FILE, MUJOCO_FILE = "rotorpy_derivatives.py", "mujoco_derivatives.py"
 _DAMPING = tuple(zip(CHANNELS, _OF_STATE[1:], strict=True))
@@ -32,7 +32,7 @@ def of_state(vehicle: Vehicle, constants: bool = True) -> tuple[Derivative, ...]
 def expressed_by(vehicle: Vehicle, to: str) -> tuple[Derivative, ...]:
     """The derivatives as a form and its companion have them; those of SIH and ArduPilot are in terms of their own."""
     if to in ("rotorpy", "mjcf"):
-        return of_state(vehicle)
+        return vehicle.derivatives  # the companion knows the rotors, too
     if to == "sdf":
         return tuple(d.model_copy(update={"low": -np.inf, "high": np.inf}) for d in of_state(vehicle, constants=False))
     return ()
@@ -61,10 +61,10 @@ def left_of(vehicle: Vehicle, taken: Sequence[Derivative], nearly: str = "") -> 
 
 
 def _table_in_flu(derivatives: Sequence[Derivative]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives of the state as a matrix (6, 7) of forward-left-up axes, and the ends (7,) of each range."""
+    """Derivatives as a matrix (6, 12) of forward-left-up axes, and the ends (12,) of each range."""
     matrix, held = table_of(tuple(derivatives))
-    ends = np.sort(held[: len(_SIGNS)] * _SIGNS[:, None], axis=1)
-    return _SIGNS[1:, None] * matrix[:, : len(_SIGNS)] * _SIGNS, ends[:, 0], ends[:, 1]
+    ends = np.sort(held * _SIGNS[:, None], axis=1)
+    return _SIGNS[1:7, None] * matrix * _SIGNS, ends[:, 0], ends[:, 1]
 
 
 def _number(value: float) -> str:
@@ -73,13 +73,37 @@ def _number(value: float) -> str:
 
 def _table(vehicle: Vehicle) -> str:
     """The Python lines that both companions share."""
-    matrix, low, high = _table_in_flu(of_state(vehicle))
+    matrix, low, high = _table_in_flu(vehicle.derivatives)
     rows = [
         f"    [{', '.join(map(_number, row + 0.0))}],  # {channel}"
         for channel, row in zip(CHANNELS, matrix, strict=True)
     ]
-    ends = [f"{name} = np.array([{', '.join(map(_number, end))}])" for name, end in (("LOW", low), ("HIGH", high))]
-    return "\n".join(["MATRIX = np.array([", *rows, "])", *ends])
+    places = vehicle.rotor_positions_m()[:, :2]
+    lift, arm = vehicle.thrust_coefficients_n_s2(), np.linalg.norm(places, axis=1).max() or 1.0
+    named = {
+        "LOW": low,
+        "HIGH": high,
+        "ALONG": places[:, 0] / arm,
+        "ACROSS": places[:, 1] / arm,
+        "SPIN": vehicle.yaw_signs(),
+    }
+    values = [f"{name} = np.array([{', '.join(map(_number, own))}])" for name, own in named.items()]
+    hover = vehicle.mass_kg * vehicle.gravity_m_s2 / lift.sum()
+    return "\n".join(["MATRIX = np.array([", *rows, "])", *values, f"HOVER = {hover:.9g}", _ADDED])
+
+
+_ADDED = '''
+
+def added(velocity, rates, squares):
+    """Force and moment (6,) at a velocity through the air, body rates and squares of the rotors' speeds, rad2/s2."""
+    of_hover = squares / HOVER
+    parts = [np.mean(x * of_hover) for x in (1.0, ACROSS, ALONG, SPIN)]
+    rotors = [parts[0] - 1.0, *parts[1:], np.mean(np.sqrt(of_hover))]
+    return MATRIX @ np.clip(np.concatenate([[1.0], velocity, rates, rotors]), LOW, HIGH)'''
+_SAID = """Force, N, and moment, N m, are MATRIX @ x, each of x held between LOW and HIGH. x is 1, velocity through the
+air, m/s, body rates, rad/s, and of the rotors, over the hover's: thrust less one; its parts about the roll and pitch
+axes; its part by spin; mean speed. Body axes forward-left-up; ALONG and ACROSS are places of the rotors forward and
+right, over the longest arm."""
 
 
 def rotorpy_companion(vehicle: Vehicle) -> str:
@@ -87,8 +111,7 @@ def rotorpy_companion(vehicle: Vehicle) -> str:
     return f'''# {vehicle.name}, exported by rotorid.
 """Derivatives for RotorPy: fly `WithDerivatives(quad_params, ...)` in place of `Multirotor(quad_params, ...)`.
 
-Force, N, and moment, N m, are MATRIX @ x of x = (1, velocity through the air, m/s, body rates, rad/s), each held
-between LOW and HIGH. Body axes forward-left-up.
+{_SAID}
 """
 
 import numpy as np
@@ -100,9 +123,8 @@ from rotorpy.vehicles.multirotor import Multirotor
 class WithDerivatives(Multirotor):
     def compute_body_wrench(self, body_rates, rotor_speeds, body_airspeed_vector):
         force, moment = super().compute_body_wrench(body_rates, rotor_speeds, body_airspeed_vector)
-        x = np.concatenate([[1.0], body_airspeed_vector, body_rates])
-        added = MATRIX @ np.clip(x, LOW, HIGH)
-        return force + added[:3], moment + added[3:]
+        more = added(body_airspeed_vector, body_rates, np.square(rotor_speeds))
+        return force + more[:3], moment + more[3:]
 '''
 
 
@@ -111,15 +133,18 @@ def mujoco_companion(vehicle: Vehicle) -> str:
     return f'''# {vehicle.name}, exported by rotorid.
 """Derivatives for MuJoCo: `mujoco.set_mjcb_passive(passive)` once, and every step adds them.
 
-Force, N, and moment, N m, are MATRIX @ x of x = (1, velocity through the air, m/s, body rates, rad/s), each held
-between LOW and HIGH. Body axes forward-left-up. MuJoCo has one such callback for all models; None takes it off;
-MJX calls none.
+{_SAID}
+MuJoCo has one such callback for all models; None takes it off; MJX calls none.
 """
 
 import mujoco
 import numpy as np
 
 {_table(vehicle)}
+
+
+THRUST = np.array([{", ".join(map(_number, vehicle.thrust_coefficients_n_s2()))}])
+"""Of each rotor, over the square of its speed, N s2/rad2."""
 
 
 def passive(model, data):
@@ -129,10 +154,10 @@ def passive(model, data):
     # Of a free joint: velocity and force in world axes, rates and moment in those of the body.
     first, rotation = model.body_dofadr[body], data.xmat[body].reshape(3, 3)
     move, turn = slice(first, first + 3), slice(first + 3, first + 6)
-    x = np.concatenate([[1.0], rotation.T @ (data.qvel[move] - model.opt.wind), data.qvel[turn]])
-    added = MATRIX @ np.clip(x, LOW, HIGH)
-    data.qfrc_passive[move] += rotation @ added[:3]
-    data.qfrc_passive[turn] += added[3:]
+    thrust = data.act if model.na else data.ctrl
+    more = added(rotation.T @ (data.qvel[move] - model.opt.wind), data.qvel[turn], np.maximum(thrust, 0.0) / THRUST)
+    data.qfrc_passive[move] += rotation @ more[:3]
+    data.qfrc_passive[turn] += more[3:]
 '''
 
 

@@ -27,7 +27,6 @@ from rotorid.vehicle.exports.derivatives import (
     left_of,
     left_of_gazebo,
     mujoco_companion,
-    of_state,
     rotorpy_companion,
 )
 from rotorid.vehicle.mixer import hover_speed_rad_s
@@ -270,18 +269,19 @@ def _in_flu(inertia: np.ndarray) -> np.ndarray:
     return inertia * np.outer(FLU, FLU)
 
 
-def _companion(vehicle: Vehicle, name: str, text_of: Callable[[Vehicle], str]) -> tuple[list[str], dict[str, str]]:
-    """Sentences for what a tool with a companion leaves of the derivatives, and the companion's name and text."""
-    taken = of_state(vehicle)
-    said = [f"derivatives: this file has none, {name} next to it adds them in the tool's own step"] if taken else []
-    return [*said, *left_of(vehicle, taken)], {name: text_of(vehicle)} if taken else {}
+def _companion(vehicle: Vehicle, to: str, name: str, text_of: Callable[[Vehicle], str]) -> tuple[str, dict[str, str]]:
+    """What is said of a tool's companion with the derivatives, and its name and text; nothing without any."""
+    if not vehicle.derivatives:
+        return "", {}
+    said = f"derivatives: this file has none, {name} next to it adds them in the tool's own step"
+    return said, {name: text_of(expressed(vehicle, to))}
 
 
 def rotorpy(vehicle: Vehicle) -> Exported:
     """RotorPy's `quad_params` as a Python file."""
     parts = parts_of(vehicle, KNOWS["rotorpy"])
-    added, companions = _companion(vehicle, ROTORPY_FILE, rotorpy_companion)
-    left = [*parts.left_out, *added]
+    added, companions = _companion(vehicle, "rotorpy", ROTORPY_FILE, rotorpy_companion)
+    left = [*parts.left_out, *([added] if added else [])]
     up, down = parts.tau_s
     if up != down:
         left.append(f"motor_lag: {up:.4g} s up and {down:.4g} s down: the mean is taken")
@@ -352,8 +352,8 @@ def mjcf(vehicle: Vehicle) -> Exported:
             left = [sentence for sentence in left if not sentence.startswith("motor_lag")]
         else:
             left.append(f"motor_lag: a lag of the rotor speed is taken as one of the thrust, {tau_s:.4g} s")
-    added, companions = _companion(vehicle, MUJOCO_FILE, mujoco_companion)
-    left += added
+    added, companions = _companion(vehicle, "mjcf", MUJOCO_FILE, mujoco_companion)
+    left += [added] if added else []
     full, limit = _numbers(in_entries(_in_flu(parts.inertia)).values()), parts.limits_rad_s
     dynamics = f' dyntype="filterexact" dynprm="{tau_s:.9g}"' if tau_s > 0 else ""
     sites, motors = [], []
