@@ -23,7 +23,7 @@ from rotorid.mismatch.evidence.regression import Regression, build
 from rotorid.mismatch.evidence.rows import Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.instrument.analyse import decided_of_reading, first_model, with_plainer_forms
-from rotorid.mismatch.instrument.chain import ChainResult, moved
+from rotorid.mismatch.instrument.chain import ChainResult, unseen_loadings
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
@@ -33,7 +33,7 @@ from rotorid.mismatch.instrument.model import (
     rows_of,
     whole_reading,
 )
-from rotorid.mismatch.instrument.setup import set_up, with_unseen
+from rotorid.mismatch.instrument.setup import set_up
 from rotorid.plan.candidates import SessionLimits
 from rotorid.plan.plan import Forecast, Plan, Tried, better_first, first_and_second
 from rotorid.plan.questions import Question, claimed_in, in_thirds, question_of
@@ -255,10 +255,7 @@ def _of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Informat
             first_temperature_c={**session.first_temperature_c, **warm},
         )
     unseen = RecordingSet(name, known.recordings.vehicle, (run,), ())
-    setup = with_unseen(replace(model.setup, session=session), unseen)
-    own = setup.loadings[len(model.setup.loadings) :]
-    if known.chain is not None and not all(x.measured for x in setup.loadings):
-        own = moved(replace(setup, loadings=own), known.chain)
+    own = unseen_loadings(replace(model.setup, session=session), unseen, known.chain)[1]
     made = rows_of(model.setup, list(terms), own, whole_reading(model.terms, model.selection.active))
     rows, rate_hz = [replace(r, y=np.nan_to_num(r.y)) for r in made], model.setup.rate_hz
     added = build(rows, list(terms), known.regression.filters, everything, model.regression.block_s, rate_hz)

@@ -26,7 +26,7 @@ from rotorid.mismatch.evidence.regression import Regression, build, ridge_invers
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.flight.absent import mean_squares
 from rotorid.mismatch.instrument.analyse import first_model
-from rotorid.mismatch.instrument.chain import ChainResult, moved
+from rotorid.mismatch.instrument.chain import ChainResult, unseen_loadings
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
@@ -45,7 +45,6 @@ from rotorid.mismatch.instrument.setup import (
     pieces_of,
     session_of,
     set_up,
-    with_unseen,
 )
 from rotorid.recordings import RecordingSet, Vehicle
 
@@ -332,8 +331,7 @@ def _compared_terms(terms: Sequence[Term], setup: PreparedInstrument) -> list[Te
 def _loadings_of(reference: InstrumentReference, new: RecordingSet) -> tuple[Loading, ...]:
     """Stretches of another set, prepared and loaded as the first set's, its rotors turning by the same chain."""
     setup = replace(reference.model.setup, session=session_of(new))
-    own = with_unseen(setup, replace(new, vehicle=setup.vehicle)).loadings[len(setup.loadings) :]
-    return own if reference.chain is None else moved(replace(setup, loadings=own), reference.chain)
+    return unseen_loadings(setup, replace(new, vehicle=setup.vehicle), reference.chain)[1]
 
 
 def _wander_of(terms: Sequence[Term], own: _OnColumns, known: np.ndarray, model: ReadingModel) -> Wander:

@@ -56,6 +56,7 @@ from rotorid.mismatch.instrument.chain import (
     moved,
     speed_traces,
     supply_reason,
+    unseen_loadings,
 )
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import (
@@ -73,7 +74,7 @@ from rotorid.mismatch.instrument.model import (
 )
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
 from rotorid.mismatch.instrument.sampling import quantisation
-from rotorid.mismatch.instrument.setup import PreparedInstrument, averaged, pieces_of, set_up, with_unseen
+from rotorid.mismatch.instrument.setup import PreparedInstrument, averaged, pieces_of, set_up
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 
@@ -413,10 +414,7 @@ def _on_every_run(model: ReadingModel, chain: ChainResult | None, unseen: Record
 
     Where only commands are known, `chain` says how the rotors turn.
     """
-    setup = with_unseen(model.setup, unseen)
-    own = setup.loadings[len(model.setup.loadings) :]
-    if chain is not None and not all(x.measured for x in setup.loadings):
-        own = moved(replace(setup, loadings=own), chain)
+    setup, own = unseen_loadings(model.setup, unseen, chain)
     kept = [t for t in model.terms if t.kind != "effect" or t.key in model.selection.active]
     cols, width = model.regression.columns([t.key for t in kept]), model.rows[0].x.shape[2]
     rows = []

@@ -36,7 +36,9 @@ from rotorid.mismatch.instrument.setup import (
     pieces_of,
     rotor_wrench,
     with_speed,
+    with_unseen,
 )
+from rotorid.recordings import RecordingSet
 
 _MOST_SAMPLES = 12_000
 _RATE_HZ = 30.0
@@ -408,6 +410,18 @@ def moved(setup: PreparedInstrument, found: ChainResult) -> tuple[Loading, ...]:
         command = x.command * (found.full_speed / problem.full_speed)
         out.append(loaded_by(replace(x, command=command, motion=with_speed(x.motion, speed)), setup.vehicle))
     return tuple(out)
+
+
+def unseen_loadings(
+    setup: PreparedInstrument, unseen: RecordingSet, found: ChainResult | None
+) -> tuple[PreparedInstrument, tuple[Loading, ...]]:
+    """The setup with the stretches of other runs behind its own, and those: their rotors turn as the chain makes of
+    their commands where only these are known."""
+    both = with_unseen(setup, unseen)
+    own = both.loadings[len(setup.loadings) :]
+    if found is not None and not all(x.measured for x in both.loadings):
+        own = moved(replace(both, loadings=own), found)
+    return both, own
 
 
 def speed_traces(setup: PreparedInstrument, found: ChainResult) -> tuple[ChannelTrace, ...]:
