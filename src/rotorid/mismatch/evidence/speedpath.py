@@ -59,14 +59,14 @@ class SpeedFit:
     chain: Chain
     values: np.ndarray
     """Parameters of every form, in order."""
-    beside: Mapping[str, float]
+    nuisances: Mapping[str, float]
     """What the recording leaves unknown of the path itself (`PathProblem.unknown`); of flights a shift in time, s."""
     cost: float
     covariance: np.ndarray | None = None
     inflation: float = 1.0
     holds: bool = True
     """Whether commands hold from sample to sample; else they are smooth, and recorded now and then."""
-    beside_sd: Mapping[str, float] = field(default_factory=dict)
+    nuisance_sd: Mapping[str, float] = field(default_factory=dict)
     blocks: int = 2
     """Blocks that the covariance is made of."""
 
@@ -141,7 +141,7 @@ class CommandChain(NamedTuple):
         if chain is None:
             chain, values = fit.chain, fit.values
         full = self.full_speed, self.full_voltage
-        return self.scale * commanded_path(segment, chain, values, fit.beside["late"], *full, fit.holds)
+        return self.scale * commanded_path(segment, chain, values, fit.nuisances["late"], *full, fit.holds)
 
 
 def commanded_path(
@@ -220,8 +220,8 @@ class PathProblem(ABC):
         """To each such number its one-sigma, lower and upper bound; at nothing the path is as it was recorded."""
 
     @abstractmethod
-    def raw(self, chain: Chain, values, beside) -> list[np.ndarray]:
-        """Residual of every stretch, (n, channels), unwhitened; `beside` are the numbers of `unknown`."""
+    def raw(self, chain: Chain, values, nuisances) -> list[np.ndarray]:
+        """Residual of every stretch, (n, channels), unwhitened; `nuisances` are the numbers of `unknown`."""
 
     @abstractmethod
     def blocks(self, sizes: Sequence[int]) -> list[list[np.ndarray]]:
@@ -230,9 +230,9 @@ class PathProblem(ABC):
         `sizes` are the rows of every stretch.
         """
 
-    def beside(self, chain: Chain, like: SpeedFit | None = None) -> np.ndarray:
+    def nuisances(self, chain: Chain, like: SpeedFit | None = None) -> np.ndarray:
         """What is unknown of a chain's path as a fit has it, nothing where that does not say."""
-        known = {} if like is None else like.beside
+        known = {} if like is None else like.nuisances
         return np.array([known.get(name, 0.0) for name in self.unknown(chain)])
 
     def noticed_s(self, form: SpeedForm) -> float:
@@ -243,19 +243,19 @@ class PathProblem(ABC):
         """Lower bounds of a form's parameters."""
         return [p.low for p in form.parameters]
 
-    def whitened(self, chain: Chain, values, beside) -> list[np.ndarray]:
+    def whitened(self, chain: Chain, values, nuisances) -> list[np.ndarray]:
         """Residual of every stretch, (n, channels), whitened by the noise learnt."""
         longest = max(len(f) for f in self.filters) - 1
-        parts = self.raw(chain, values, beside)
+        parts = self.raw(chain, values, nuisances)
         return [np.stack([causal(f, p[:, j]) for j, f in enumerate(self.filters)], axis=1)[longest:] for p in parts]
 
     def left_by(self, fit: SpeedFit) -> list[np.ndarray]:
         """Residual of every stretch that a fit leaves, (n, channels), unwhitened."""
-        return self.raw(fit.chain, fit.values, self.beside(fit.chain, fit))
+        return self.raw(fit.chain, fit.values, self.nuisances(fit.chain, fit))
 
-    def left(self, chain: Chain, values, beside) -> float:
+    def left(self, chain: Chain, values, nuisances) -> float:
         """Whitened squares that a chain leaves."""
-        return sum(float((w**2).sum()) for w in self.whitened(chain, values, beside))
+        return sum(float((w**2).sum()) for w in self.whitened(chain, values, nuisances))
 
     def learn_noise(self, fit: SpeedFit) -> None:
         """Take the residual of a rich chain as the noise."""
@@ -283,7 +283,7 @@ class PathProblem(ABC):
         own = len(start)
         low = np.append([x for _, f in chain for x in self.low_of(f)], low)
         high = np.append([p.high for _, f in chain for p in f.parameters], high)
-        x0 = np.append(start, self.beside(chain, like))
+        x0 = np.append(start, self.nuisances(chain, like))
         if not len(x0):
             return SpeedFit(chain, x0, {}, self.left(chain, x0, x0), holds=self.holds)
         x0 = np.clip(x0, low + 1e-9, high - 1e-9)
@@ -297,12 +297,12 @@ class PathProblem(ABC):
         found = least_squares(
             function, x0, bounds=(low, high), x_scale=scale, diff_step=1e-4, max_nfev=25, ftol=1e-5, xtol=1e-5
         )
-        beside = dict(zip(self.unknown(chain), map(float, found.x[own:]), strict=True))
-        return SpeedFit(chain, found.x[:own], beside, 2 * found.cost, holds=self.holds)
+        nuisances = dict(zip(self.unknown(chain), map(float, found.x[own:]), strict=True))
+        return SpeedFit(chain, found.x[:own], nuisances, 2 * found.cost, holds=self.holds)
 
     def with_covariance(self, fit: SpeedFit) -> SpeedFit:
         """The fit with a covariance that is robust against what whitening left, and allows for few blocks."""
-        x, own = np.append(fit.values, self.beside(fit.chain, fit)), len(fit.values)
+        x, own = np.append(fit.values, self.nuisances(fit.chain, fit)), len(fit.values)
         sd = np.array([one_sigma for one_sigma, *_ in self.unknown(fit.chain).values()])
         base = self.whitened(fit.chain, x[:own], x[own:])
         least = np.append(np.full(own, 1e-2), np.where(np.isfinite(sd), sd, 1e-2))
@@ -334,7 +334,7 @@ class PathProblem(ABC):
             fit,
             covariance=covariance[:own, :own],
             inflation=max(1.0, float(np.median(ratio))) if own and self.coloured else 1.0,
-            beside_sd=dict(zip(fit.beside, map(float, np.sqrt(np.diag(covariance)[own:])), strict=True)),
+            nuisance_sd=dict(zip(fit.nuisances, map(float, np.sqrt(np.diag(covariance)[own:])), strict=True)),
             blocks=count,
         )
 
@@ -354,11 +354,11 @@ class MeasuredSpeed(PathProblem):
         self.segments, self.full_voltage = segments, full_voltage
         self._last: dict[int, LastSteps] = {id(s): {} for s in segments}
 
-    def raw(self, chain: Chain, values, beside) -> list[np.ndarray]:
+    def raw(self, chain: Chain, values, nuisances) -> list[np.ndarray]:
         """Measured less modelled speeds of every segment, (n, rotors), rad/s."""
         full = self.full_speed, self.full_voltage, self.holds
         return [
-            s.motion.rotor_speed - commanded_path(s, chain, values, float(beside[0]), *full, self._last[id(s)])
+            s.motion.rotor_speed - commanded_path(s, chain, values, float(nuisances[0]), *full, self._last[id(s)])
             for s in self.segments
         ]
 
@@ -404,8 +404,8 @@ class SpeedSearch:
 
     def best_fit(self, chain: Chain, base: SpeedFit, added: SpeedForm) -> SpeedFit:
         """The chain of `base` plus one form, from the one of the form's starts that leaves least."""
-        beside, starts = self.problem.beside(chain, base), [np.append(base.values, s) for s in self.starts(added)]
-        return self.problem.fit(chain, min(starts, key=lambda start: self.problem.left(chain, start, beside)), base)
+        nuisances, starts = self.problem.nuisances(chain, base), [np.append(base.values, s) for s in self.starts(added)]
+        return self.problem.fit(chain, min(starts, key=lambda start: self.problem.left(chain, start, nuisances)), base)
 
     def starts(self, form: SpeedForm) -> list[np.ndarray]:
         """Starting values of a form: of a limit shares of the way from the usual command to the outermost (nothing acts
@@ -584,7 +584,7 @@ class SpeedSearch:
         form, values = fit.of(key)
         delays = form.stage == DELAY
         least = self.problem.noticed_s(form)
-        away = values + fit.beside.get("late", 0.0) if delays else values
+        away = values + fit.nuisances.get("late", 0.0) if delays else values
         limits = [max(p.negligible, least) for p in form.parameters]
         return all(abs(v - n) < limit for v, n, limit in zip(away, form.neutral, limits, strict=True))
 

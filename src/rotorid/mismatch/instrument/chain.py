@@ -174,7 +174,7 @@ class StandPath(PathProblem):
         self.holds = holds
         if not self.measured:
             self.leave_to_rotors()
-        spread = self.noise_of(self.raw((), np.zeros(0), self.beside(())))
+        spread = self.noise_of(self.raw((), np.zeros(0), self.nuisances(())))
         self.filters = [np.array([1.0 / s]) for s in spread]
 
     def unknown(self, chain: Chain) -> Mapping[str, tuple[float, float, float]]:
@@ -219,7 +219,7 @@ class StandPath(PathProblem):
             self._made[key] = speed if np.isfinite(speed).all() else np.nan_to_num(speed)
         return self._made[key]
 
-    def speed(self, loading: Loading, chain: Chain, values, beside) -> np.ndarray:
+    def speed(self, loading: Loading, chain: Chain, values, nuisances) -> np.ndarray:
         """Rotor speeds (n, k), rad/s, that a chain makes of a stretch's commands; they scale with the full speed."""
         at, own = 0, {}
         for key, form in chain:
@@ -227,8 +227,8 @@ class StandPath(PathProblem):
         path = sorted(chain, key=lambda pair: pair[1].stage)
         finer = _FINER if _takes_time(chain) else 1
         speed = self.made(loading, tuple(path), tuple(float(v) for key, _ in path for v in own[key]), finer)
-        speed = moved_between_samples(speed, np.asarray(beside)[int(self.scaled) :], loading.dt_s, finer)
-        return speed[:, self.start_of(loading, finer).which] * (1.0 + (beside[0] if self.scaled else 0.0))
+        speed = moved_between_samples(speed, np.asarray(nuisances)[int(self.scaled) :], loading.dt_s, finer)
+        return speed[:, self.start_of(loading, finer).which] * (1.0 + (nuisances[0] if self.scaled else 0.0))
 
     def leave_to_rotors(self) -> None:
         """Take off the readings that are fitted what effects add at any speed alike, and off the loads the rotors' own.
@@ -249,13 +249,13 @@ class StandPath(PathProblem):
         self.others = acting
         self.fitted = [replace(x, load=x.load - rotor_wrench(x.motion, vehicle)) for x in own]
 
-    def raw(self, chain: Chain, values, beside, loadings=None) -> list[np.ndarray]:
+    def raw(self, chain: Chain, values, nuisances, loadings=None) -> list[np.ndarray]:
         """Measured less modelled response of every stretch, (rows, rotors), or of every piece, (rows, channels), less
         its mean over all."""
         accelerating = any("rotor_acceleration" in form.requires for form, _ in self.others)
         out = []
         for x in self.fitted if loadings is None else loadings:
-            speed = self.speed(x, chain, values, beside)
+            speed = self.speed(x, chain, values, nuisances)
             if self.measured:
                 out.append((x.motion.rotor_speed if x.speed_read is None else x.speed_read) - speed)
                 continue
@@ -338,7 +338,7 @@ def find_chain(setup: PreparedInstrument, others: list | None = None) -> ChainRe
         result = replace(result, alternatives={k: (*result.alternatives[k], *own) for k, own in more.items()})
     rotors = range(setup.vehicle.rotor_count)
     channels = tuple(f"rotor_speed_{i + 1}" for i in rotors) if problem.measured else ("force_z",)
-    share, doubt = (of["full"] if problem.scaled else 0.0 for of in (result.fit.beside, result.fit.beside_sd))
+    share, doubt = (of["full"] if problem.scaled else 0.0 for of in (result.fit.nuisances, result.fit.nuisance_sd))
     findings = tuple(path_findings(result, channels))
     return ChainResult(result, problem.full_speed * (1.0 + share), problem.full_speed * doubt, findings)
 
@@ -369,7 +369,7 @@ def _reading_alternatives(problem: StandPath, result: SpeedResult, key: str) -> 
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
     rest, most = result.without[key], result.fit.cost + rules.ELSEWHERE["squares"]
-    known, own = np.append(rest.values, problem.beside(rest.chain, rest)), len(rest.values)
+    known, own = np.append(rest.values, problem.nuisances(rest.chain, rest)), len(rest.values)
     free = np.array(list(problem.unknown(rest.chain).values())).reshape(-1, 3)
     low = np.append([x for _, f in rest.chain for x in problem.low_of(f)], free[:, 1])
     high = np.append([p.high for _, f in rest.chain for p in f.parameters], free[:, 2])
@@ -406,7 +406,7 @@ def moved(setup: PreparedInstrument, found: ChainResult) -> tuple[Loading, ...]:
     problem = StandPath(setup, holds=fit.holds)
     out = []
     for x in setup.loadings:
-        speed = problem.speed(x, fit.chain, fit.values, problem.beside(fit.chain, fit))
+        speed = problem.speed(x, fit.chain, fit.values, problem.nuisances(fit.chain, fit))
         command = x.command * (found.full_speed / problem.full_speed)
         out.append(loaded_by(replace(x, command=command, motion=with_speed(x.motion, speed)), setup.vehicle))
     return tuple(out)
@@ -428,8 +428,8 @@ def speed_traces(setup: PreparedInstrument, found: ChainResult) -> tuple[Channel
     """Measured less commanded and less modelled speed of every rotor, where both are recorded."""
     fit = found.result.fit
     problem = StandPath(setup, holds=fit.holds)
-    believed = problem.raw((), np.zeros(0), problem.beside((), fit), setup.loadings)
-    left = problem.raw(fit.chain, fit.values, problem.beside(fit.chain, fit), setup.loadings)
+    believed = problem.raw((), np.zeros(0), problem.nuisances((), fit), setup.loadings)
+    left = problem.raw(fit.chain, fit.values, problem.nuisances(fit.chain, fit), setup.loadings)
     out = []
     for x, a, b in zip(setup.loadings, believed, left, strict=True):
         times, a, b = averaged(x.time_s, setup.average), averaged(a, setup.average), averaged(b, setup.average)

@@ -110,7 +110,7 @@ def test_the_forms_at_work_are_found_with_their_values_and_no_others(seed, volta
     assert {key: found.name for key, found in fit.chain} == {key: name for key, (name, *_) in at_work.items()}
     for key, (_, values, allowed) in at_work.items():
         # The nuisance shift of half a sample shares a delay.
-        found = fit.of(key)[1] + (fit.beside["late"] if key == "delay" else 0.0)
+        found = fit.of(key)[1] + (fit.nuisances["late"] if key == "delay" else 0.0)
         np.testing.assert_allclose(found, values, atol=allowed)
 
 
