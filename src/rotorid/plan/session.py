@@ -102,12 +102,14 @@ def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None =
     questions, unanswerable = [], [(f.alternatives, f.sentence) for f in mistakes if f.status == "ambiguous"]
     chosen = chosen_already(model)
     inside = with_probabilities(decided_of_reading(model), chosen.found, chosen.support)
+    seen = {frozenset(ids) for ids, _ in unanswerable}
     for finding in (*inside, *(() if chain is None else chain.findings)):
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
         if claimed is not None and finding.id not in claimed:
             continue
-        if not ids or any(set(ids) == set(q.ids) for q in questions):
+        if not ids or frozenset(ids) in seen:
             continue
+        seen.add(frozenset(ids))
         question = question_of(model, finding, ids)
         if question is None:
             unanswerable.append(
