@@ -510,11 +510,12 @@ class SpeedSearch:
             for (key, _), fit in others.items():
                 p, score, _ = self.judge(current, fit, key)
                 options.append((score, p, key, fit))
-            options.sort(key=lambda o: -o[0])
+            # What makes rotors hardly follow may do with other forms of what is there, but only after all else.
+            options.sort(key=lambda o: (self.responds(o[3]), o[0]), reverse=True)
             grown = False
             for score, p, key, fit in options:
                 if score <= 0:
-                    break
+                    continue
                 if self.p_of(fit, key, p) > ENTER_P or self.negligible(fit, key):
                     continue
                 size = self.size(fit, key)
