@@ -77,6 +77,8 @@ LAG_SILENT = (
     "in no band of lift, roll or pitch the vehicle follows its commands without the commands following the vehicle: "
     "excite collective and attitude up to 8 Hz"
 )
+_SURELY_LATE = 3.0
+"""Standard errors by which rotors must be late to be called so."""
 ELASTICITY = (0.6, 4.0)
 """Elasticities of thrust over command that a speed controller, a motor and a propeller can have."""
 _SLOWEST_S, _LONGEST_DELAY_S = 0.2, 0.06
@@ -508,7 +510,8 @@ def chain_of_lift(
     if found.sags:
         supply = _of_stage(SUPPLY)
         add(supply, supply.about(found.voltage_reference_v / full_voltage), found.voltage)
-    if found.lag_s is not None and found.lag_s[0] > 1.96 * found.lag_s[1]:
+    # Between two commands nobody recorded what happened.
+    if found.lag_s is not None and found.lag_s[0] > max(_SURELY_LATE * found.lag_s[1], 0.5 / command_rate_hz):
         late = _of_stage(found.late_by)
         add(late, late.speed_forms[0], found.lag_s)
         if found.one_of_two:

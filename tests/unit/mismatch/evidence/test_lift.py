@@ -7,6 +7,7 @@ import pytest
 
 from rotorid.effects.contract import LAG
 from rotorid.effects.motor_lag import lagged
+from rotorid.mismatch.evidence import lift
 from rotorid.mismatch.evidence.lift import causal_bands, chain_of_lift, read_path
 from rotorid.mismatch.evidence.motion import Segment
 from tests.unit.mismatch.evidence.test_rows import still
@@ -120,3 +121,14 @@ def test_bands_of_a_cause_and_of_an_answer():
     assert late.alone[0] > late.alone[1] + 9.0
     # An answer grows with the frequency, a quarter of a turn late.
     assert causal_bands(*response(lambda f: -1j * f / 1.5, 0.0, 0.0), (0.3, 2.0), (0.0, 13.0)) is None
+
+
+@pytest.mark.parametrize(
+    ("late_s", "sd_s", "named"), [(0.02, 0.004, True), (0.02, 0.008, False), (0.004, 0.001, False)]
+)
+def test_a_lateness_within_half_a_sample_or_three_standard_errors_is_no_lag(monkeypatch, late_s, sd_s, named):
+    """Commands at 100 Hz: what happens in 5 ms nobody recorded."""
+    found = lift.LiftPath(reference=1200.0, voltage_reference_v=None, lag_s=(late_s, sd_s))
+    monkeypatch.setattr(lift, "read_path", lambda *_: found)
+    chain = chain_of_lift([], VEHICLE, FULL, None, RATE_HZ).result.fit.chain
+    assert [key for key, _ in chain] == (["motor_lag"] if named else [])
