@@ -34,7 +34,7 @@ from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import Regression, autoregression
 from rotorid.mismatch.evidence.rows import Term, residual
-from rotorid.mismatch.evidence.speedpath import starts_of
+from rotorid.mismatch.evidence.speedpath import starts_of, steps_of
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.delivered import ways
 from rotorid.mismatch.flight.fitted import Fitted, fitted
@@ -67,8 +67,7 @@ class _ChainModel:
     @property
     def steps(self) -> tuple[tuple[SpeedForm, np.ndarray], ...]:
         """Speed forms with their values, in the order of the chain."""
-        ends = np.cumsum([len(form.parameters) for _, form in self.chain])
-        return tuple(zip((form for _, form in self.chain), np.split(self.values, ends[:-1]), strict=True))
+        return tuple((form, own) for _, form, own in steps_of(self.chain, self.values))
 
 
 def _leftover(found: Fitted, segments: Sequence[Segment]) -> Callable[[tuple, np.ndarray], np.ndarray]:

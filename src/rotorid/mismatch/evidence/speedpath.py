@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -52,6 +52,15 @@ LastSteps = dict[int, list[tuple[np.ndarray, tuple, np.ndarray]]]
 """By place in a chain: speeds that a step was given, the step with its values, and what it made."""
 
 
+def steps_of(chain: Chain, values: Sequence) -> list[tuple[str, SpeedForm, Any]]:
+    """Ids of a chain with their forms and their own of its values."""
+    out, at = [], 0
+    for key, form in chain:
+        out.append((key, form, values[at : at + len(form.parameters)]))
+        at += len(form.parameters)
+    return out
+
+
 @dataclass(frozen=True)
 class SpeedFit:
     """A fitted chain."""
@@ -72,12 +81,8 @@ class SpeedFit:
 
     def slice_of(self, effect_id: str) -> slice:
         """Where the id's parameters stand in `values`."""
-        at = 0
-        for key, form in self.chain:
-            if key == effect_id:
-                return slice(at, at + len(form.parameters))
-            at += len(form.parameters)
-        raise KeyError(effect_id)
+        own = {key: places for key, _, places in steps_of(self.chain, range(len(self.values)))}[effect_id]
+        return slice(own.start, own.stop)
 
     def of(self, effect_id: str) -> tuple[SpeedForm, np.ndarray]:
         """Form and values of one id."""
@@ -160,10 +165,7 @@ def commanded_path(
     """
     motion = segment.motion
     path = SpeedPath(segment.command, motion.time_s, full_speed, motion.voltage, full_voltage)
-    steps, at = [], 0
-    for _, form in chain:
-        steps.append((form.stage, form.apply, values[at : at + len(form.parameters)]))
-        at += len(form.parameters)
+    steps = [(form.stage, form.apply, own) for _, form, own in steps_of(chain, values)]
     steps.append((DELAY, shifted if holds else moved, np.array([shift_s])))
     for place, (_, apply, own) in enumerate(sorted(steps, key=lambda s: s[0])):
         known = [] if last is None else last.setdefault(place, [])
@@ -235,6 +237,10 @@ class PathProblem(ABC):
         known = {} if like is None else like.nuisances
         return np.array([known.get(name, 0.0) for name in self.unknown(chain)])
 
+    def doubts(self, chain: Chain) -> np.ndarray:
+        """One-sigma of each nuisance, (k,)."""
+        return np.array([sd for sd, *_ in self.unknown(chain).values()])
+
     def noticed_s(self, form: SpeedForm) -> float:
         """Time by which rotors must be late by a form to be called so: between two samples nobody recorded anything."""
         return 0.5 / self.rate_hz if form.stage >= DELAY else 0.0
@@ -242,6 +248,13 @@ class PathProblem(ABC):
     def low_of(self, form: SpeedForm) -> list[float]:
         """Lower bounds of a form's parameters."""
         return [p.low for p in form.parameters]
+
+    def bounds(self, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of a chain's values and nuisances, (k,) each."""
+        ends = self.unknown(chain).values()
+        low = [*(x for _, f in chain for x in self.low_of(f)), *(low for _, low, _ in ends)]
+        high = [*(p.high for _, f in chain for p in f.parameters), *(high for *_, high in ends)]
+        return np.array(low), np.array(high)
 
     def whitened(self, chain: Chain, values, nuisances) -> list[np.ndarray]:
         """Residual of every stretch, (n, channels), whitened by the noise learnt."""
@@ -279,10 +292,8 @@ class PathProblem(ABC):
 
         What is unknown of the path starts as another fit has it.
         """
-        sd, low, high = np.array(list(self.unknown(chain).values())).reshape(-1, 3).T
-        own = len(start)
-        low = np.append([x for _, f in chain for x in self.low_of(f)], low)
-        high = np.append([p.high for _, f in chain for p in f.parameters], high)
+        own, (low, high) = len(start), self.bounds(chain)
+        sd = self.doubts(chain)
         x0 = np.append(start, self.nuisances(chain, like))
         if not len(x0):
             return SpeedFit(chain, x0, {}, self.left(chain, x0, x0), holds=self.holds)
@@ -303,7 +314,7 @@ class PathProblem(ABC):
     def with_covariance(self, fit: SpeedFit) -> SpeedFit:
         """The fit with a covariance that is robust against what whitening left, and allows for few blocks."""
         x, own = np.append(fit.values, self.nuisances(fit.chain, fit)), len(fit.values)
-        sd = np.array([one_sigma for one_sigma, *_ in self.unknown(fit.chain).values()])
+        sd = self.doubts(fit.chain)
         base = self.whitened(fit.chain, x[:own], x[own:])
         least = np.append(np.full(own, 1e-2), np.where(np.isfinite(sd), sd, 1e-2))
         columns = []

@@ -27,6 +27,7 @@ from rotorid.mismatch.evidence.speedpath import (
     PathProblem,
     SpeedResult,
     SpeedSearch,
+    steps_of,
 )
 from rotorid.mismatch.instrument.setup import (
     SHORT,
@@ -174,8 +175,6 @@ class StandPath(PathProblem):
         self.holds = holds
         if not self.measured:
             self.leave_to_rotors()
-        spread = self.noise_of(self.raw((), np.zeros(0), self.nuisances(())))
-        self.filters = [np.array([1.0 / s]) for s in spread]
 
     def unknown(self, chain: Chain) -> Mapping[str, tuple[float, float, float]]:
         """Share that the full speed is larger, then moments of the course between samples: late (s), spread (s²).
@@ -221,12 +220,9 @@ class StandPath(PathProblem):
 
     def speed(self, loading: Loading, chain: Chain, values, nuisances) -> np.ndarray:
         """Rotor speeds (n, k), rad/s, that a chain makes of a stretch's commands; they scale with the full speed."""
-        at, own = 0, {}
-        for key, form in chain:
-            own[key], at = values[at : at + len(form.parameters)], at + len(form.parameters)
-        path = sorted(chain, key=lambda pair: pair[1].stage)
-        finer = _FINER if _takes_time(chain) else 1
-        speed = self.made(loading, tuple(path), tuple(float(v) for key, _ in path for v in own[key]), finer)
+        steps = sorted(steps_of(chain, values), key=lambda step: step[1].stage)
+        path, finer = tuple((key, form) for key, form, _ in steps), _FINER if _takes_time(chain) else 1
+        speed = self.made(loading, path, tuple(float(v) for *_, own in steps for v in own), finer)
         speed = moved_between_samples(speed, np.asarray(nuisances)[int(self.scaled) :], loading.dt_s, finer)
         return speed[:, self.start_of(loading, finer).which] * (1.0 + (nuisances[0] if self.scaled else 0.0))
 
@@ -370,9 +366,7 @@ def _reading_alternatives(problem: StandPath, result: SpeedResult, key: str) -> 
     out = sorted(ids_of("same_on_commands", key))
     rest, most = result.without[key], result.fit.cost + rules.ELSEWHERE["squares"]
     known, own = np.append(rest.values, problem.nuisances(rest.chain, rest)), len(rest.values)
-    free = np.array(list(problem.unknown(rest.chain).values())).reshape(-1, 3)
-    low = np.append([x for _, f in rest.chain for x in problem.low_of(f)], free[:, 1])
-    high = np.append([p.high for _, f in rest.chain for p in f.parameters], free[:, 2])
+    low, high = problem.bounds(rest.chain)
 
     def explains(form: Form, value: float) -> bool:
         first, with_it = form.parameters[0], copy(problem)
