@@ -35,9 +35,9 @@ _WORSE_RATIO = 1.01
 _LEAST_Z = 2.0
 """Standard errors over blocks of a second by which squares must have changed, either way."""
 _WORTH_A_WORD = 0.002
-_GAINS = (0.5, 2.0)
-"""Factors of thrust and moments within which they are values: commands that follow gusts feign a vehicle that does not
-answer, of which half a second ahead seems well predicted."""
+GAINS_OF_COMMANDS = (0.5, 2.0)
+"""Factors of thrust and moments, from commands alone, within which they are values: commands that follow gusts feign a
+vehicle that does not answer, of which half a second ahead seems well predicted."""
 
 
 class FittedModel(Protocol):
@@ -146,7 +146,7 @@ def values_without_path(
     """Values refitted where rotors turn as commanded, and what they leave of every stretch, (n, 12).
 
     By least squares on the first `fitted` stretches: one factor of the thrust, and one of each moment, which goes into
-    the inertia about its axis; what is beyond GAINS stays as believed. Given is what the `believed` vehicle leaves, and
+    the inertia about its axis; what is beyond GAINS_OF_COMMANDS stays as believed. Given is what the `believed` vehicle leaves, and
     what it leaves where its rotors turn √2 times as `faster`: thrust and moments go with the square.
     """
     made = [a - b for a, b in zip(believed, faster, strict=True)]
@@ -154,7 +154,8 @@ def values_without_path(
     known = np.isfinite(own) & np.isfinite(left)
     own, left = np.where(known, own, 0.0), np.where(known, left, 0.0)
     gain = 1.0 + (own * left).sum(axis=0) / np.maximum((own**2).sum(axis=0), 1e-300)
-    gain = np.where((gain < _GAINS[0]) | (gain > _GAINS[1]), 1.0, gain)
+    least, most = GAINS_OF_COMMANDS
+    gain = np.where((gain < least) | (gain > most), 1.0, gain)
     lift, *moments = (float(g) for g in gain)
     inertias = {f"inertia_{a}{a}": (lift / g - 1.0, 0.0) for a, g in zip("xyz", moments, strict=True)}
     values = {"thrust": (lift - 1.0, 0.0), "torque": (lift - 1.0, 0.0), **inertias}

@@ -26,7 +26,7 @@ from rotorid.mismatch.decide.selected import SMALLEST_CHANGE, SMALLEST_SIZE, coe
 from rotorid.mismatch.decide.statements import SURE
 from rotorid.mismatch.evidence.regression import DOUBT_OF_CORRECTION, Regression, ridge_inverse
 from rotorid.mismatch.evidence.rows import winds_last
-from rotorid.mismatch.flight.delivered import Values
+from rotorid.mismatch.flight.delivered import GAINS_OF_COMMANDS, Values
 from rotorid.mismatch.flight.prepare import assemble_rows
 from rotorid.mismatch.flight.wrench import WrenchModel, after_residual, chosen, model_filters, whitened
 from rotorid.recordings.signal.kernels import low_pass
@@ -90,7 +90,8 @@ def _trust_of(model: WrenchModel) -> dict[str, float]:
 def gains_of(model: WrenchModel, prior: Prior) -> dict[str, LogGain]:
     """The gains that a flight shows, by the key of the value in their denominator.
 
-    Where commands alone say how fast rotors turn, a lag that is not quite theirs changes what is quick: no band judges.
+    Where commands alone say how fast rotors turn, a lag that is not quite theirs changes what is quick: no band judges;
+    and a gain of the moments beyond what commands can show is not shown: the controller's answers may make all of it.
     """
     every, free = model.search.regression, [k for k in GAINS if k in model.regression.keys_of("value")]
     measured = all(s.measured_speed for s in model.segments)
@@ -113,7 +114,9 @@ def gains_of(model: WrenchModel, prior: Prior) -> dict[str, LogGain]:
                 if first.own > 0
             }
         )
-    return {key: mean_of([found[key] for found in bands if key in found]) for key in bands[0]}
+    gains = {key: mean_of([found[key] for found in bands if key in found]) for key in bands[0]}
+    least, most = np.log(GAINS_OF_COMMANDS)
+    return {k: g for k, g in gains.items() if measured or k == "mass" or least <= g.log <= most}
 
 
 @dataclass(frozen=True)
