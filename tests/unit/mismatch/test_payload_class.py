@@ -1,7 +1,9 @@
 """A centre of mass off its place may be a payload where the vehicle is heavier than believed."""
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.analyse import payload_or_offset
 from rotorid.mismatch.decide.findings import Finding
+from tests.unit.mismatch.flights import quad
 
 OFFSET = Finding(id="com_offset", status="established")
 PRODUCTS = Finding(id="inertia_products", status="established")
@@ -30,3 +32,8 @@ def test_a_vehicle_that_is_not_surely_heavier_carries_none():
 
 def test_without_an_offset_there_is_no_question():
     assert classes({"mass": (0.05, 0.002)}, PRODUCTS) == {"inertia_products": ()}
+
+
+def test_a_load_shows_its_mass_however_it_hangs():
+    """What swings and weighs nothing is a disturbance that comes and goes."""
+    assert all(form.must_show == (0,) for form in catalogue()["payload"].forms(quad()))

@@ -32,6 +32,8 @@ _LEAST_SHARE = 0.01
 than 0.7 % of what a model explains."""
 _LARGE_GAIN = 0.9
 """Error with an effect over that without up to which its gain in a channel is large, however small its share of all."""
+_NEXT_TO_NO_GAIN = 0.998
+"""The same from which an effect betters no channel: it is at work in nobody's recording, however sure."""
 NOTHING = "every number of it may be nothing"
 _NEAR_AN_END = 0.01
 """Share of a range from its end at which a length or a damping is held there."""
@@ -109,15 +111,19 @@ def judged(
         windows = [_in_windows(t, finding.windows) for t in analysis.compared]
         reported, _ = contribution(analysis, without, windows, acts_on)
     slight = found and next(iter(found.values()))[0] > _LARGE_GAIN
+    idle = found and min(ratio for ratio, *_ in found.values()) > _NEXT_TO_NO_GAIN
     reason = ""
     if rules.BELOW_LEFTOVER(not beyond and not (analysis.command_path and finding.speed_form)):
         reason = "it is smaller than what the model leaves over"
+        reason += " or half a step of the reading" if _half_steps(analysis) else ""
     elif may_be_nothing(finding):
         reason = NOTHING
     elif _at_the_end_of_a_cable(finding):
         reason = "its cable or its damping is at the end of what is looked for"
     elif rules.SLIGHT(bool(share < _LEAST_SHARE and slight and not finding.windows)):
         reason = f"it takes {100 * share:.1f} % of the error that goes"
+    elif rules.SLIGHT(bool(idle and not finding.windows)):
+        reason = "it betters no channel by a five-hundredth"
     finding = replace(finding, gain=next(iter(reported.values()), None))
     return lowered(finding, reason) if reason else finding
 
@@ -164,7 +170,8 @@ def contribution(
     """What some rows (masks of the traces) say of an effect, given what is left of the traces without it.
 
     First the gain in every channel that the effect acts on by the channel's name, the most significant first, none
-    where the rows do not excite it; then whether it contributes more than the model leaves over in some such channel.
+    where the rows do not excite it; then whether it contributes more than the model leaves over in some such channel,
+    and more than half a step where the reading is coarse: what is less may be rounding.
 
     Judged are the channels that the effect `acts_on`, others change by what the rest of the model is fitted to
     without it, and what two sensors say of each other: a wrong mass makes up for an accelerometer's scale in the force,
@@ -186,8 +193,15 @@ def contribution(
     differing = [c for c in here if here[c] > _ACTS * strongest]
     acting = [c for c in here if c in acts_on or (c in sensors and c in differing)] or differing
     ratios = {c: r for c in acting if (r := ratio_of(analysis, without, rows, c)) is not None}
-    beyond = any(here[c] * noise[c] > _leftover_rms(analysis, rows, c) for c in acting)
+    rounding = _half_steps(analysis)
+    beyond = any(here[c] * noise[c] > max(_leftover_rms(analysis, rows, c), rounding.get(c, 0.0)) for c in acting)
     return dict(sorted(ratios.items(), key=lambda pair: pair[1][2])), beyond
+
+
+def _half_steps(analysis: Analysis) -> dict[str, float]:
+    """Half a step of every channel whose steps are larger than its noise, in the channel's unit."""
+    coarse = (p for f in analysis.findings if f.id == "quantisation" and f.status in CLAIMED for p in f.parameters)
+    return {p.symbol.removeprefix("q_"): 0.5 * p.value for p in coarse}
 
 
 def _leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> float:

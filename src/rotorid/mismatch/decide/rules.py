@@ -192,10 +192,14 @@ ONE_LOAD = rule("one_load", "On one rotor that does not tilt, thrust and reading
 
 # Statuses
 
-BELOW_LEFTOVER = rule("below_leftover", "An effect smaller than the unmodelled residual is not established.")
+BELOW_LEFTOVER = rule(
+    "below_leftover",
+    "An effect smaller than the unmodelled residual, or than half a step of a coarse reading, is not established.",
+)
 SLIGHT = rule(
     "slight",
-    "An effect with next to no share of the explained error and no large gain in any channel is not established.",
+    "An effect with next to no share of the explained error and no large gain in any channel, or with next to no gain "
+    "at all, is not established.",
 )
 MAY_BE_NOTHING = rule("may_be_nothing", "An effect without a significant parameter is not established.")
 

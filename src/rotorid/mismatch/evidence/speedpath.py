@@ -36,7 +36,9 @@ _PLAINLY_LESS = 0.98
 """Share of the squares that commands leave as they are first taken, which hold or are smooth, below which they are the
 other: a lag imitates either."""
 _HARDLY_FOLLOWS = "rotors would hardly follow their commands with it"
-_LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
+_LIMIT_WAYS, _LIMIT_SHARES = (0.97, 0.9, 0.8, 0.65, 0.5), (0.02, 0.05, 0.1, 0.2, 0.3, 0.4)
+"""Starts of a limit: of the way from the usual command to the outermost, which may be that of a single jerk, and of the
+commands that it holds."""
 _MOST_LIMITED = 0.5
 """Share of the time that a limit may hold a rotor."""
 _AT_BOUND = 1e-3
@@ -419,14 +421,16 @@ class SpeedSearch:
         return self.problem.fit(chain, min(starts, key=lambda start: self.problem.left(chain, start, nuisances)), base)
 
     def starts(self, form: SpeedForm) -> list[np.ndarray]:
-        """Starting values of a form: of a limit shares of the way from the usual command to the outermost (nothing acts
-        beyond it, and nothing says there which way to go)."""
+        """Starting values of a form: of a limit on the way from the usual command to the outermost (nothing acts beyond
+        it, and nothing says there which way to go), and such as hold a share of the commands."""
         if form.stage != LIMIT:
             return starts_of(form)
         shares = np.concatenate([c.ravel() for c, _ in self.problem.commands]) / self.problem.full_speed
         middle = float(np.median(shares))
         outermost = float(self.neutral(form)[0])
-        return [np.array([middle + way * (outermost - middle)]) for way in _LIMIT_WAYS]
+        held = np.array(_LIMIT_SHARES) if outermost < middle else 1.0 - np.array(_LIMIT_SHARES)
+        on_the_way = middle + np.array(_LIMIT_WAYS) * (outermost - middle)
+        return list(np.concatenate([on_the_way, np.quantile(shares, held)])[:, None])
 
     @step("how large the noise is")
     def rich_noise(self) -> None:

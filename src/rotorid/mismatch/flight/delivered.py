@@ -146,8 +146,8 @@ def values_without_path(
     """Values refitted where rotors turn as commanded, and what they leave of every stretch, (n, 12).
 
     By least squares on the first `fitted` stretches: one factor of the thrust, and one of each moment, which goes into
-    the inertia about its axis; what is beyond GAINS_OF_COMMANDS stays as believed. Given is what the `believed` vehicle leaves, and
-    what it leaves where its rotors turn √2 times as `faster`: thrust and moments go with the square.
+    the inertia about its axis; what is beyond GAINS_OF_COMMANDS stays as believed. Given is what the `believed` vehicle
+    leaves, and what it leaves where its rotors turn √2 times as `faster`: thrust and moments go with the square.
     """
     made = [a - b for a, b in zip(believed, faster, strict=True)]
     own, left = (np.concatenate(parts[:fitted])[:, 2:6] for parts in (made, believed))

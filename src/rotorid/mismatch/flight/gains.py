@@ -90,8 +90,7 @@ def _trust_of(model: WrenchModel) -> dict[str, float]:
 def gains_of(model: WrenchModel, prior: Prior) -> dict[str, LogGain]:
     """The gains that a flight shows, by the key of the value in their denominator.
 
-    Where commands alone say how fast rotors turn, a lag that is not quite theirs changes what is quick: no band judges;
-    and a gain of the moments beyond what commands can show is not shown: the controller's answers may make all of it.
+    Where commands alone say how fast rotors turn, a lag that is not quite theirs changes what is quick: no band judges.
     """
     every, free = model.search.regression, [k for k in GAINS if k in model.regression.keys_of("value")]
     measured = all(s.measured_speed for s in model.segments)
@@ -115,8 +114,13 @@ def gains_of(model: WrenchModel, prior: Prior) -> dict[str, LogGain]:
             }
         )
     gains = {key: mean_of([found[key] for found in bands if key in found]) for key in bands[0]}
+    return gains if measured else shown_by_commands(gains)
+
+
+def shown_by_commands(gains: Mapping[str, LogGain]) -> dict[str, LogGain]:
+    """The gains less those of moments that are no values: a controller's answers make them."""
     least, most = np.log(GAINS_OF_COMMANDS)
-    return {k: g for k, g in gains.items() if measured or k == "mass" or least <= g.log <= most}
+    return {k: g for k, g in gains.items() if k == "mass" or least <= g.log <= most}
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,8 @@ _P_LIMIT, _P_LATE = 1e-6, 1e-4
 """Chance of a growth of lateness, and of a constant one beyond a sample; both have to bring LEAST_LIKELIHOOD too."""
 _LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
+_SURE_SIGMAS = 3.0
+"""Standard errors that a constant lateness has once it is measured with the other sensors put right."""
 _FILTER_SAMPLES, _FILTER_S = 2.6, 0.008
 """One inertial sensor, or the commands, alone off by less than both is a filter or a controller, not a logger."""
 _SMALL_LAGS = {
@@ -674,8 +676,12 @@ def _delay(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
         steps = round(amount / sample) * sample
         nearly = _shifted(unfiltered, _with_position(cluster), steps)
         amount, sd = _remeasured(nearly, cluster, 0, steps, others) or (amount, sd)
-        if abs(amount) < min(limits[n] for n in cluster):
-            notes.append(f"{capital(_listed(cluster))}: {1e3 * amount:+.1f} ms against the rest, below a sample.")
+        # Measured once more it may be less sure: the word has to agree with the interval that stands beside it.
+        if abs(amount) < max(_SURE_SIGMAS * sd, min(limits[n] for n in cluster)):
+            notes.append(
+                f"{capital(_listed(cluster))}: {1e3 * amount:+.1f} ms against the rest, "
+                f"give or take {1e3 * 1.96 * sd:.1f} ms: not surely a sample or more."
+            )
             continue
         fixed = _shifted(fixed, _with_position(cluster), amount)
         how = f"{1e3 * abs(amount):.1f} ms {'late' if amount > 0 else 'early'}"

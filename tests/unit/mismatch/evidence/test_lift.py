@@ -119,7 +119,11 @@ def test_bands_of_a_cause_and_of_an_answer():
     assert own.alone[1] > own.alone[0] + 9.0  # no delay
     late = causal_bands(*response(lambda f: 0.9 + 0 * f, 0.0, 0.03), (0.3, 2.0), (0.0, 13.0))
     assert late.alone[0] > late.alone[1] + 9.0
-    # An answer grows with the frequency, a quarter of a turn late.
+    # A loop that answers a part of what happens adds what looks late, and grows with the frequency.
+    for share in (0.03, 0.06):
+        answered = response(lambda f, share=share: 0.7 * (1 - 2j * np.pi * f * share), 0.0, 0.0)
+        assert causal_bands(*answered, (0.3, 2.0), (1.8, 6.0)) is None
+    # An answer alone is a quarter of a turn late.
     assert causal_bands(*response(lambda f: -1j * f / 1.5, 0.0, 0.0), (0.3, 2.0), (0.0, 13.0)) is None
 
 
@@ -132,3 +136,9 @@ def test_a_lateness_within_half_a_sample_or_three_standard_errors_is_no_lag(monk
     monkeypatch.setattr(lift, "read_path", lambda *_: found)
     chain = chain_of_lift([], VEHICLE, FULL, None, RATE_HZ).result.fit.chain
     assert [key for key, _ in chain] == (["motor_lag"] if named else [])
+
+
+def test_what_one_controller_feigns_in_roll_and_pitch_is_no_surer_for_being_there_twice():
+    mean, sd = lift._of_one_loop([(0.040, 0.010), (0.042, 0.012)])
+    assert 0.040 < mean < 0.042 and sd == 0.010
+    assert lift._of_one_loop([(0.02, 0.002), (0.06, 0.002)])[1] > 0.01

@@ -18,6 +18,7 @@ from rotorid.mismatch.evidence.speedpath import (
     starts_of,
 )
 from tests.unit.mismatch.evidence.test_rows import still
+from tests.unit.mismatch.flights import smooth
 
 RATE_HZ, FULL = 100.0, 2500.0
 
@@ -127,6 +128,22 @@ def test_a_limit_that_is_reached_in_one_second_of_twenty_is_found():
         result = SpeedSearch(MeasuredSpeed(flown, full, None), candidate_forms(flown)).run()
         assert [k for k, _ in result.fit.chain] == ["command_saturation"]
         assert result.fit.values[0] == pytest.approx(1450.0 / full, rel=0.01)
+
+
+def test_a_limit_far_below_the_outermost_command_is_no_curve():
+    """Rotors that saturate a third of the time a little above their hover, and one command that once goes far beyond.
+
+    From starts near the outermost command alone the search stayed there, and a curve took the limit's place.
+    """
+    segment = recorded(11, seconds=40.0)
+    time_s, rng = segment.motion.time_s, np.random.default_rng(3)
+    command = 1100.0 + np.stack([smooth(rng, 10 * len(time_s), 60.0, 1.0)[::10] for _ in range(4)], axis=1)
+    command[:, 0] += 700.0 * np.exp(-(((time_s - 20.0) / 0.3) ** 2))
+    speed = np.minimum(command, 1130.0) + 2.0 * rng.standard_normal(command.shape)
+    flown = [replace(segment, motion=replace(segment.motion, rotor_speed=speed), command=command)]
+    result = SpeedSearch(MeasuredSpeed(flown, FULL, None), candidate_forms(flown)).run()
+    assert [k for k, _ in result.fit.chain] == ["command_saturation"]
+    assert result.fit.values[0] * FULL == pytest.approx(1130.0, rel=0.002)
 
 
 def test_a_limit_that_holds_a_rotor_most_of_the_time_is_none():

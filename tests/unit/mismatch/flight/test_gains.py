@@ -10,7 +10,7 @@ from rotorid.mismatch.decide.selected import coefficients, relative_change
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.delivered import settled
 from rotorid.mismatch.flight.fitted import Fitted, fitted
-from rotorid.mismatch.flight.gains import Side, gains_of, mean_of, merged
+from rotorid.mismatch.flight.gains import Side, gains_of, mean_of, merged, shown_by_commands
 from rotorid.mismatch.flight.prepare import prepare
 from tests.unit.mismatch.flights import DENSE_HZ, quad, recorded, smooth, with_table
 
@@ -101,3 +101,9 @@ def test_the_told_inertia_is_the_one_delivered():
     free = model.regression.with_room(0.6).fit([*model.selection.active, "inertia_xx"], loose={"inertia_xx": 0.1})
     biased, _ = coefficients(model.regression, free, "inertia_xx")
     assert abs(relative_change("inertia_xx", float(biased[0]), 0.0)[0] - change) > 3 * sd
+
+
+def test_commands_alone_show_no_moment_beyond_a_factor_of_two():
+    """A yaw moment of an eighth is a controller that answers what turns the vehicle, not another rotor."""
+    gains = {k: LogGain(np.log(x), 0.01) for k, x in (("mass", 2.5), ("inertia_xx", 0.6), ("inertia_zz", 0.12))}
+    assert list(shown_by_commands(gains)) == ["mass", "inertia_xx"]

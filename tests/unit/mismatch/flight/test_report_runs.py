@@ -11,7 +11,7 @@ import pytest
 
 from rotorid.mismatch.analyse import analyse, with_noise_held_out
 from rotorid.mismatch.decide.enough import contribution, ratio_of, weighed
-from rotorid.mismatch.decide.findings import ChannelTrace
+from rotorid.mismatch.decide.findings import ChannelTrace, Finding, in_interval
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.absent import evidence_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
@@ -95,6 +95,34 @@ def test_what_takes_no_share_of_the_error_of_the_fitted_runs_does_not_stand():
     judged = weighed(replace(analysis, findings=unsure, without={**analysis.without, "rotor_drag": alike}))
     found = {f.id: f for f in judged.findings}["rotor_drag"]
     assert found.status == "suggested" and "takes 0.0 %" in found.objection
+
+
+def test_what_betters_no_channel_does_not_stand_though_all_that_goes_goes_with_it():
+    """Where nothing else is found, next to nothing is the whole of what is explained."""
+    analysis = analysed(0.0)
+    traces, between = (
+        tuple(replace(t, before=t.named * (1.0 + 2e-4)) for t in own)
+        for own in (analysis.traces, analysis.between_sensors)
+    )
+    alike = tuple(t.before for t in (*traces, *between))
+    little = replace(analysis, traces=traces, between_sensors=between, without=dict.fromkeys(analysis.without, alike))
+    judged = weighed(little)
+    found = {f.id: f for f in judged.findings}["rotor_drag"]
+    assert found.status == "not_established" and "betters no channel" in found.sentence
+
+
+def test_what_is_less_than_half_a_step_of_a_coarse_reading_does_not_stand():
+    analysis = analysed(0.0)
+    pairs = zip(analysis.without["rotor_drag"], analysis.compared, strict=True)
+    largest = max(float(np.abs(left - t.named).max()) for left, t in pairs)
+    for step, status in ((1e-3 * largest, "established"), (10.0 * largest, "not_established")):
+        every = dict.fromkeys(t.channel for t in analysis.compared)
+        coarse = Finding(
+            "quantisation", "established", parameters=tuple(in_interval(f"q_{c}", step, "N", 0.0) for c in every)
+        )
+        judged = weighed(replace(analysis, findings=(*analysis.findings, coarse)))
+        found = {f.id: f for f in judged.findings}["rotor_drag"]
+        assert found.status == status and (status == "established" or "half a step" in found.sentence)
 
 
 @pytest.mark.parametrize("size_m_s2", [0.0, 1.5, 30.0])
@@ -209,7 +237,10 @@ def test_an_error_of_a_sensor_is_judged_by_what_two_sensors_say():
     force = ChannelTrace("a", "force_z", "N", time_s, noise + missed, noise, noise, noise)
     between = ChannelTrace("a", "accelerometer_z", "m/s2", time_s, noise + missed, noise + missed, noise, noise)
     analysis = SimpleNamespace(
-        compared=(force, between), between_sensors=(between,), noise_floor={"force_z": 1.0, "accelerometer_z": 1.0}
+        compared=(force, between),
+        between_sensors=(between,),
+        noise_floor={"force_z": 1.0, "accelerometer_z": 1.0},
+        findings=(),
     )
     every = [np.ones(len(time_s), bool)] * 2
     gains, beyond = contribution(analysis, (noise, noise + missed), every, ("force_z",))
