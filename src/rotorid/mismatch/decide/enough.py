@@ -200,8 +200,8 @@ def contribution(
 
 def _half_steps(analysis: Analysis) -> dict[str, float]:
     """Half a step of every channel whose steps are larger than its noise, in the channel's unit."""
-    coarse = (p for f in analysis.findings if f.id == "quantisation" and f.status in CLAIMED for p in f.parameters)
-    return {p.symbol.removeprefix("q_"): 0.5 * p.value for p in coarse}
+    claims = [f for f in analysis.findings if f.status in CLAIMED]
+    return {c: 0.5 * p.value for f in claims for c in f.channels for p in f.parameters if p.symbol == f"q_{c}"}
 
 
 def _leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> float:

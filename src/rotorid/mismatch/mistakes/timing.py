@@ -38,7 +38,7 @@ _P_LIMIT, _P_LATE = 1e-6, 1e-4
 _LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
 _SURE_SIGMAS = 3.0
-"""Standard errors that a constant lateness has once it is measured with the other sensors put right."""
+"""Standard errors that a constant lateness has measured once more beside the corrected sensors."""
 _FILTER_SAMPLES, _FILTER_S = 2.6, 0.008
 """One inertial sensor, or the commands, alone off by less than both is a filter or a controller, not a logger."""
 _SMALL_LAGS = {
