@@ -116,10 +116,9 @@ def test_what_is_less_than_half_a_step_of_a_coarse_reading_does_not_stand():
     pairs = zip(analysis.without["rotor_drag"], analysis.compared, strict=True)
     largest = max(float(np.abs(left - t.named).max()) for left, t in pairs)
     for step, status in ((1e-3 * largest, "established"), (10.0 * largest, "not_established")):
-        every = dict.fromkeys(t.channel for t in analysis.compared)
-        coarse = Finding(
-            "quantisation", "established", parameters=tuple(in_interval(f"q_{c}", step, "N", 0.0) for c in every)
-        )
+        every = tuple(dict.fromkeys(t.channel for t in analysis.compared))
+        steps = tuple(in_interval(f"q_{c}", step, "N", 0.0) for c in every)
+        coarse = Finding("quantisation", "established", parameters=steps, channels=every)
         judged = weighed(replace(analysis, findings=(*analysis.findings, coarse)))
         found = {f.id: f for f in judged.findings}["rotor_drag"]
         assert found.status == status and (status == "established" or "half a step" in found.sentence)
