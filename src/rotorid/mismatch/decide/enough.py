@@ -33,7 +33,7 @@ than 0.7 % of what a model explains."""
 _LARGE_GAIN = 0.9
 """Error with an effect over that without up to which its gain in a channel is large, however small its share of all."""
 _NEXT_TO_NO_GAIN = 0.998
-"""The same from which an effect betters no channel: it is at work in nobody's recording, however sure."""
+"""The same above which a gain is none, however significant."""
 NOTHING = "every number of it may be nothing"
 _NEAR_AN_END = 0.01
 """Share of a range from its end at which a length or a damping is held there."""
@@ -114,8 +114,8 @@ def judged(
     idle = found and min(ratio for ratio, *_ in found.values()) > _NEXT_TO_NO_GAIN
     reason = ""
     if rules.BELOW_LEFTOVER(not beyond and not (analysis.command_path and finding.speed_form)):
-        reason = "it is smaller than what the model leaves over"
-        reason += " or half a step of the reading" if _half_steps(analysis) else ""
+        coarse = " or half a step of the reading" if _half_steps(analysis) else ""
+        reason = f"it is smaller than what the model leaves over{coarse}"
     elif may_be_nothing(finding):
         reason = NOTHING
     elif _at_the_end_of_a_cable(finding):

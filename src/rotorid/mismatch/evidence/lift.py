@@ -64,7 +64,7 @@ _PLAINER = 9.0
 """Whitened squares by which one form must be better than another that is plainer."""
 _LIKELIER = 1.0
 """Whitened squares by which a loop's answer must explain a response better than a lag or a delay to be the likelier:
-of late rotors, measured, it explains lift and moments 0.5 worse to 50 worse, of the loop's answers 3 to 13 better."""
+of rotors recorded late it explains moments 10 to 49 worse, lift 0.3 better to 12 worse; of answers 3 to 13 better."""
 _WIDEST_VOLTAGE = 0.8
 """The same of the voltage's exponent, absolute."""
 _SQUARE, _SLIGHT = 2.0, 0.04
@@ -302,10 +302,20 @@ def _explained(bands: Sequence[tuple], gain: tuple[float, float]) -> Bands | Non
     scatter = np.sqrt((1 - coherence) / (2 * np.maximum(coherence, 1e-3) * count))
     sd = np.hypot(scatter, _TOLERANCE)
 
+    def off(model: np.ndarray) -> np.ndarray:
+        """Logarithm of the response over a model's, in standard errors: of the gain, then of the phase."""
+        ratio = np.log(response / model)
+        return np.concatenate([ratio.real / sd, ratio.imag / sd])
+
     def left(q: np.ndarray) -> np.ndarray:
-        model = q[0] * np.exp(-2j * np.pi * f_hz * q[2]) / (1 + 2j * np.pi * f_hz * q[1])
-        off = np.log(response / model)
-        return np.concatenate([off.real / sd, off.imag / sd])
+        return off(q[0] * np.exp(-2j * np.pi * f_hz * q[2]) / (1 + 2j * np.pi * f_hz * q[1]))
+
+    def answered(q: np.ndarray) -> np.ndarray:
+        """What is left by rotors that are not late, of whose commands a share answers the rates: gain (1 − jωT).
+
+        A controller commands a moment against a rate, so what turns is, negative, the integral of what is commanded.
+        """
+        return off(q[0] * (1 - 2j * np.pi * f_hz * q[1]))
 
     start = float(np.clip(np.abs(response[0]), *gain))
 
@@ -321,25 +331,12 @@ def _explained(bands: Sequence[tuple], gain: tuple[float, float]) -> Bands | Non
     if not gain[0] < both.x[0] < gain[1]:
         return None
     alone = 2 * best(_SLOWEST_S, 0.0).cost, 2 * best(0.0, _SLOWEST_S).cost
-    if _answered(f_hz, response, sd, start) < min(alone) - _LIKELIER:
+    ends = ([1e-3 * start, 0.0], [1e3 * start, np.inf])
+    tries = [(start, share * _SLOWEST_S) for share in (0.05, 0.25, 0.6)]
+    of_loop = 2 * min(least_squares(answered, t, bounds=ends, x_scale=[start, 0.02]).cost for t in tries)
+    if of_loop < min(alone) - _LIKELIER:
         return None
     return Bands(float(f_hz[0]), float(f_hz[-1]), *map(float, both.x), float(coherence.mean()), alone)
-
-
-def _answered(f_hz: np.ndarray, response: np.ndarray, sd: np.ndarray, start: float) -> float:
-    """What rotors that are not late leave of a response, squares over variance, where the loop answers disturbances.
-
-    A controller commands a moment against a rate: of the share of the commands that does, what turns is the integral of
-    what is commanded, negative. The response is gain (1 − jωT).
-    """
-
-    def left(q: np.ndarray) -> np.ndarray:
-        off = np.log(response / (q[0] * (1 - 2j * np.pi * f_hz * q[1])))
-        return np.concatenate([off.real / sd, off.imag / sd])
-
-    tries = [(start, share * _SLOWEST_S) for share in (0.05, 0.25, 0.6)]
-    bounds = ([1e-3 * start, 0.0], [1e3 * start, np.inf])
-    return 2 * min(least_squares(left, t, bounds=bounds, x_scale=[start, 0.02]).cost for t in tries)
 
 
 @dataclass(frozen=True)
@@ -431,7 +428,8 @@ def read_path(segments: Sequence[Segment], vehicle: Vehicle, command_rate_hz: fl
         if found is not None:
             bands[name] = found
     reasons = {}
-    moments, lift_late = [_lateness(b) for name, b in bands.items() if name != "lift"], []
+    moments = [_lateness(b) for name, b in bands.items() if name != "lift"]
+    late = [_of_one_loop(moments)] if moments else []
     elasticity = voltage = None
     shape = "power"
     if "lift" in bands:
@@ -442,14 +440,13 @@ def read_path(segments: Sequence[Segment], vehicle: Vehicle, command_rate_hz: fl
         line, _ = _fit(problem, _line, free, power.values, weights)
         shape, fit = ("line", line) if line.cost < power.cost - _PLAINER else ("power", power)
         sd = _doubted(problem, bands["lift"], SHAPES[shape], free, fit, weights)
-        lift_late = [(fit.values[2], sd[2])]
+        late.append((fit.values[2], sd[2]))
         if 1.96 * sd[0] <= _WIDEST * fit.values[0] and ELASTICITY[0] <= fit.values[0] <= ELASTICITY[1]:
             elasticity = fit.values[0], sd[0]
             scale = fit.scale
         if elasticity is not None and knows and 1.96 * sd[1] <= _WIDEST_VOLTAGE:
             voltage = fit.values[1], sd[1]
     reasons |= {key: LIFT_SILENT for key, own in ((CURVE, elasticity), (SUPPLY, voltage)) if own is None}
-    late = [*lift_late, *([_of_one_loop(moments)] if moments else [])]
     lag = _together(late) if late else None
     arm_m = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).max())
     latest_s = _LATEST * np.sqrt(arm_m / vehicle.gravity_m_s2) if arm_m > 0 else np.inf

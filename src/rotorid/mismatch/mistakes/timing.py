@@ -38,7 +38,7 @@ _P_LIMIT, _P_LATE = 1e-6, 1e-4
 _LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
 _SURE_SIGMAS = 3.0
-"""Standard errors that a constant lateness has measured once more beside the corrected sensors."""
+"""Standard errors that a constant lateness has when it is measured once more, the other sensors corrected."""
 _FILTER_SAMPLES, _FILTER_S = 2.6, 0.008
 """One inertial sensor, or the commands, alone off by less than both is a filter or a controller, not a logger."""
 _SMALL_LAGS = {
@@ -676,7 +676,7 @@ def _delay(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
         steps = round(amount / sample) * sample
         nearly = _shifted(unfiltered, _with_position(cluster), steps)
         amount, sd = _remeasured(nearly, cluster, 0, steps, others) or (amount, sd)
-        # Measured once more it may be less sure: the word has to agree with the interval that stands beside it.
+        # Measured once more it may be less sure: the status agrees with the stated interval.
         if abs(amount) < max(_SURE_SIGMAS * sd, min(limits[n] for n in cluster)):
             notes.append(
                 f"{capital(_listed(cluster))}: {1e3 * amount:+.1f} ms against the rest, "
