@@ -76,12 +76,6 @@ from rotorid.vehicle.improved import active_forms
 
 _UNITS = {"force": "N", "moment": "N m"}
 _SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
-_NO_DEPENDENCE_P = 0.01
-"""p-value of a residual's dependence on what is recorded from which it is taken for noise."""
-
-_TIMING_FLOOR = 0.05
-"""One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as nobody
-recorded."""
 
 
 def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
@@ -380,10 +374,13 @@ def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:
         findings.append(gust_finding(model.gusts))
     if found.chain is not None:
         rotors, full = prepared.vehicle.rotor_count, found.chain.full_speed
+        # One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as
+        # nobody recorded.
+        timing_floor = 0.05
         findings += path_findings(
             found.chain.result,
             tuple(f"rotor_speed_{i + 1}" for i in range(rotors)) if found.measured else ("force_z",),
-            _TIMING_FLOOR / prepared.segments[0].rate_hz,
+            timing_floor / prepared.segments[0].rate_hz,
             lambda form, values: _limited_windows(prepared.segments, form, values, full),
         )
     return findings
@@ -616,9 +613,10 @@ def with_noise_held_out(analysis: Analysis) -> Analysis:
     if analysis.without or analysis.wrong_values:
         return analysis
     part, floors = fitted_part(analysis), dict(analysis.noise_floor)
+    no_dependence_p = 0.01  # p-value of a residual's dependence on what is recorded from which it is taken for noise.
     for channel, traces in by_channel(analysis.traces).items():
         left = rms(t.named[part(t.run, t.time_s) < 0] for t in traces)
-        noise = analysis.p_values.get(channel, (0.0, 0.0))[1] > _NO_DEPENDENCE_P
+        noise = analysis.p_values.get(channel, (0.0, 0.0))[1] > no_dependence_p
         if noise and channel not in analysis.unexplained_channels and not np.isnan(left):
             floors[channel] = max(floors.get(channel, 0.0), left)
     return replace(analysis, noise_floor=floors)

@@ -26,13 +26,13 @@ import numpy as np
 from rotorid.mismatch.decide.problem import Prior
 from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S
 from rotorid.mismatch.evidence.motion import Segment
-from rotorid.mismatch.evidence.regression import Regression, autoregression, build, ridge_inverse
+from rotorid.mismatch.evidence.regression import Regression, autoregression, ridge_inverse
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.evidence.split import HELD_OUT_SHARE
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 from rotorid.mismatch.flight.absent import scales
 from rotorid.mismatch.flight.prepare import Prepared, assemble_rows, prepare_like
-from rotorid.mismatch.flight.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments, whitened
+from rotorid.mismatch.flight.wrench import after_residual, channel_floor, chosen, path_segments, whitened
 from rotorid.plan.candidates import Limits, Reference
 from rotorid.plan.questions import FittedSet, Hypothesis, Question, chain_interval, chain_squares
 from rotorid.plan.simulate import ChangedVehicle, CompetingModel, SimulatedFlight, commands, fly, recorded
@@ -218,8 +218,8 @@ def _of_flight(
     segments = _stretches_of(known, prepared, flight, world)
     if known.fitted.commanded:
         segments = path_segments(segments, known.fitted.chain, prepared.thinner.cutoff_hz)
-    rows, rate_hz = assemble_rows(prepared, acting, segments, effects), prepared.thinner.rate_hz
-    own = build(rows, acting, known.regression.filters, lambda run, t: True, block_seconds(rows, rate_hz), rate_hz)
+    rows = assemble_rows(prepared, acting, segments, effects)
+    own = known.regression.again(rows, acting)
     seconds = float(flight.motion.time_s[-1] - flight.motion.time_s[0])
     gram = own.gram.sum(axis=0) if change is None else _after_change(own, terms, change)
     shares = seconds * _shares_of(rows, prepared.vehicle) if change is None else 0.0

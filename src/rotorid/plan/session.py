@@ -19,7 +19,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.mismatch.decide.findings import with_probabilities
-from rotorid.mismatch.evidence.regression import Regression, build
+from rotorid.mismatch.evidence.regression import Regression
 from rotorid.mismatch.evidence.rows import Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.instrument.analyse import decided_of_reading, first_model, with_plainer_forms
@@ -28,7 +28,6 @@ from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
     chosen_already,
-    everything,
     make_terms,
     rows_of,
     whole_reading,
@@ -259,8 +258,7 @@ def _of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Informat
     unseen = RecordingSet(name, known.recordings.vehicle, (run,), ())
     own = unseen_loadings(replace(model.setup, session=session), unseen, known.chain)[1]
     made = rows_of(model.setup, list(terms), own, whole_reading(model.terms, model.selection.active))
-    rows, rate_hz = [replace(r, y=np.nan_to_num(r.y)) for r in made], model.setup.rate_hz
-    added = build(rows, list(terms), known.regression.filters, everything, model.regression.block_s, rate_hz)
+    added = known.regression.again([replace(r, y=np.nan_to_num(r.y)) for r in made], terms)
     return Information(placed(known, terms, added.gram.sum(axis=0)), seconds=seconds)
 
 

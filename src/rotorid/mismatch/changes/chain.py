@@ -24,8 +24,6 @@ from rotorid.mismatch.flight.fitted import Fitted
 from rotorid.mismatch.flight.prepare import assemble_rows
 from rotorid.mismatch.flight.report_runs import as_flown
 
-_STEP_S, _STEP = 0.002, 0.01
-"""Changes of a time and of another parameter from which its column is taken."""
 _OF_ROTORS = "offset:rotors"
 """Start of the keys of offsets in time that are a delay of the commands: the chain has it."""
 
@@ -79,7 +77,8 @@ class ChainTerms:
     def steps(self) -> np.ndarray:
         """(P,) changes from which columns are taken, away from the upper bound."""
         own = self.parameters
-        size = np.array([_STEP_S if p.unit == "s" else _STEP for p in own])
+        step_s, step = 0.002, 0.01  # Changes of a time and of another parameter from which its column is taken.
+        size = np.array([step_s if p.unit == "s" else step for p in own])
         return np.where(self.values + size > [p.high for p in own], -size, size)
 
     def at(self, values: np.ndarray) -> ChainTerms:
@@ -179,7 +178,7 @@ def speed_rows(segments: Sequence[Segment], found: Fitted, chain: ChainTerms, fi
 def speed_evidence(rows: list[Rows], filters: dict[int, np.ndarray], chain: ChainTerms, first: ChainTerms) -> Evidence:
     """The evidence of measured rotor speeds, one channel a rotor."""
     rate_hz = chain.rate_hz
-    regression = build(rows, chain.terms, filters, lambda run, time_s: True, 1.0, rate_hz, by_channel=True)
+    regression = build(rows, chain.terms, filters, None, 1.0, rate_hz, by_channel=True)
     return chain.named(evidence_from(regression), first)
 
 

@@ -99,8 +99,6 @@ from rotorid.steps import one_thread, step
 _LARGER = 2.0
 """How many times the residual of the first set that of the second must be, in some force or moment, to be noted."""
 _KEYS = {name: key for key, name in NAMES.items()}
-_CONTRADICTION_NATS = 32.0
-"""What columns that contradict each other say for a mistake at least: an axis is named from eight standard errors."""
 
 
 @dataclass(frozen=True)
@@ -251,7 +249,9 @@ def _most_alike(reference: FittedReference, new: RecordingSet) -> tuple[Joint, l
 def price_of(mistakes: Sequence[Finding]) -> float:
     """What mistakes in recordings cost, nats, less what their own columns say for them."""
     contradictions = ids_of("contradiction")
-    return PRIOR.effect_nats * len(mistakes) - _CONTRADICTION_NATS * sum(m.id in contradictions for m in mistakes)
+    # What columns that contradict each other say for a mistake at least: an axis is named from eight standard errors.
+    contradiction_nats = 32.0
+    return PRIOR.effect_nats * len(mistakes) - contradiction_nats * sum(m.id in contradictions for m in mistakes)
 
 
 def _changed_effects(reference: FittedReference, found: Found) -> Effects:

@@ -21,13 +21,13 @@ from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.statements import FORM_SD
 from rotorid.mismatch.evidence.gram import Evidence, EvidenceTerm, evidence_from
 from rotorid.mismatch.evidence.motion import Segment, regime_variables
-from rotorid.mismatch.evidence.regression import NEVER_EXCITED, Regression, build
+from rotorid.mismatch.evidence.regression import NEVER_EXCITED, Regression
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.flight.absent import squares_of
 from rotorid.mismatch.flight.fitted import Fitted, fitted
 from rotorid.mismatch.flight.prepare import assemble_rows, prepare, prepare_like, value_terms
 from rotorid.mismatch.flight.report_runs import as_flown, comparable
-from rotorid.mismatch.flight.wrench import WrenchModel, block_seconds, chosen, model_filters
+from rotorid.mismatch.flight.wrench import WrenchModel, chosen
 from rotorid.mismatch.instrument.model import ReadingModel
 from rotorid.mismatch.mistakes import find_mistakes, in_its_units
 from rotorid.recordings import RecordingSet, Vehicle
@@ -97,8 +97,6 @@ class FittedReference:
     terms: tuple[Term, ...]
     """Of force, moment and sensors, and where rotor speeds are known from commands alone of the chain."""
     rows: tuple[Rows, ...]
-    block_s: float
-    """Length of a block of rows in both sets."""
     known: np.ndarray
     """(K,) coefficients of the effects that its model holds, 0 of all others."""
     usual_of_chain: np.ndarray
@@ -132,13 +130,12 @@ def reference_of(base: RecordingSet) -> FittedReference:
     segments, rows = _rows_of(found, terms, chain, recorded)
     of_chain = chain.terms if found.commanded else []
     known = coefficients_on([*terms, *of_chain], model, model.selection.active)
-    block_s = block_seconds(rows, model.prepared.thinner.rate_hz)
     usual = np.zeros(len(known))
     if of_chain:
         usual[-len(chain.values) :] = chain.spread
     again = _rows_of(found, terms, chain, noisy)[1] if noisy else []
     alike = [len(r.y) for r in rows] == [len(r.y) for r in again]
-    regression = _regression_of(rows, [*terms, *of_chain], model, block_s, again if alike else None)
+    regression = model.regression.again(rows, [*terms, *of_chain], again if alike else None)
     found_noise = evidence_from(regression)
     noise = found_noise.bias_gram / found_noise.blocks.sum()
     evidence = _evidence_of(regression, noise, known, *((chain, chain) if of_chain else ()))
@@ -149,7 +146,6 @@ def reference_of(base: RecordingSet) -> FittedReference:
         chain=chain,
         terms=tuple(terms),
         rows=tuple(rows),
-        block_s=block_s,
         known=known,
         usual_of_chain=usual,
         noise=noise,
@@ -166,7 +162,7 @@ def on_columns(reference: FittedReference, terms: Sequence[Term], chain: ChainTe
     found, first = reference.found, reference.chain
     _, rows = _rows_of(found, terms, chain, reference.recorded, first)
     of_chain = chain.terms if found.commanded else []
-    regression = _regression_of(rows, [*terms, *of_chain], found.model, reference.block_s)
+    regression = found.model.regression.again(rows, [*terms, *of_chain])
     evidence = _evidence_of(regression, reference.noise, reference.known, *((chain, first) if of_chain else ()))
     runs = by_run(evidence, regression)
     return replace(reference, terms=tuple(terms), rows=tuple(rows), evidence=evidence, runs=runs)
@@ -235,8 +231,8 @@ def joined_at(
     rows = [replace(r, x=r.x * seen) for r in rows]
     terms = [*reference.terms, *(chain.terms if found.commanded else [])]
     regimes = [(s.run, regime_variables(s, model.prepared)) for s in segments]
-    slow = slower(regimes, model.prepared.vehicle, reference.block_s, reference.flown)
-    of_new = _regression_of(rows, terms, model, reference.block_s, within=slow)
+    slow = slower(regimes, model.prepared.vehicle, model.regression.block_s, reference.flown)
+    of_new = model.regression.again(rows, terms, within=slow)
     if (of_new.by_channel.environment < 0).all():
         raise InputError(
             f"set {new.name}: all of it is more than {FARTHER} times as fast as {reference.recordings.name}; "
@@ -426,20 +422,3 @@ def _recorded_stretches(found: Fitted, recordings: RecordingSet) -> tuple[list[S
     both = prepare_like(replace(found.prepared, vehicle=recordings.vehicle), recordings)
     as_it_is, noisy = ([s for s in own if comparable(s, found.model.segments[0])] for own in both)
     return as_it_is, noisy
-
-
-def _regression_of(
-    rows: list[Rows],
-    terms: list[Term],
-    model: WrenchModel,
-    block_s: float,
-    noisy: list[Rows] | None = None,
-    within: Callable[[str, float], bool | None] = lambda run, time_s: True,
-) -> Regression:
-    """The regression that some rows make, whitened as the model's, with its products by channel.
-
-    `noisy` are the rows with the sensors' noise added once more. `within` says of the middle of a block whether it
-    counts (`regression.build`).
-    """
-    rate_hz = model.prepared.thinner.rate_hz
-    return build(rows, terms, model_filters(model), within, block_s, rate_hz, noisy, by_channel=True)

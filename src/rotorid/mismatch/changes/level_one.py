@@ -116,8 +116,6 @@ SCATTER = (
 Of a slope what goes beyond the flights' own doubt, or half of that doubt where it explains all."""
 ASSUMED = {"lift_without_voltage": (0.1, 3)}
 """One-sigma and degrees of freedom of what no laboratory shows: here of a battery whose voltage is not recorded."""
-_KNOWN = 1e6
-"""Degrees of freedom of a scatter that is taken as known."""
 _FREEDOM = (2.0, 10.0)
 """Bounds of the degrees of freedom that the usual scatter counts as."""
 
@@ -494,7 +492,8 @@ def _difference(
     apart = numbers.places[second].mean(axis=0) - numbers.places[first].mean(axis=0)
     believed = _overstated(numbers.own, found, freedom)
     tests = []
-    for variance, degrees in ((joint, total), (usual.most**2, _KNOWN)):
+    known = 1e6  # Degrees of freedom of a scatter that is taken as known.
+    for variance, degrees in ((joint, total), (usual.most**2, known)):
         each = [variance + w if q.kind in SLOPES else np.maximum(variance, believed * w) for w in owns]
         sd = float(np.sqrt(sum(v.mean() / len(v) for v in each) + apart @ numbers.doubt @ apart))
         reach = -stdtrit(degrees, 0.25 * FALSE_ALARMS * share) - stdtrit(degrees, 0.05)

@@ -22,7 +22,7 @@ from rotorid.mismatch.changes.problem import PRIOR, change_of, joined, pair_of
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.posterior import Found, Model, Posterior
 from rotorid.mismatch.evidence.gram import TINY, Evidence, evidence_from
-from rotorid.mismatch.evidence.regression import Regression, build, ridge_inverse
+from rotorid.mismatch.evidence.regression import Regression, ridge_inverse
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.flight.absent import mean_squares
 from rotorid.mismatch.instrument.analyse import first_model
@@ -31,7 +31,6 @@ from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
     ReadingSearch,
-    everything,
     make_terms,
     refined,
     rows_of,
@@ -177,13 +176,12 @@ def _on_columns(
     What is at work in the model is moved by its clock. The rows of another set have what its own `vehicle` leaves of
     every channel; the columns stay the first's.
     """
-    setup, rate_hz = model.setup, model.setup.rate_hz
+    setup = model.setup
     rows = rows_of(setup, list(terms), loadings, whole_reading(model.terms, model.selection.active))
     if vehicle not in (None, setup.vehicle):
         own = rows_of(setup, [], [loaded_by(x, vehicle) for x in loadings])
         rows = [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
-    block_s = model.rows_per_block / rate_hz
-    regression = build(rows, list(terms), model.regression.filters, everything, block_s, rate_hz, by_channel=True)
+    regression = model.regression.again(rows, terms)
     evidence = evidence_from(regression)
     return _OnColumns(tuple(rows), regression, evidence, by_run(evidence, regression))
 

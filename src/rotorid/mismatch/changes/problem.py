@@ -59,19 +59,12 @@ _DERIVED = "rotor_acceleration"
 """What is a derivative of recorded speeds: how much of it is noise depends on the flight, and is not known."""
 NAMES = {**VALUE_NAMES, **PARAMETER_NAMES}
 """Key of every believed value, of a flight or an instrument, to the contract's name."""
-_LEAST_CHANGE, MOST_CHANGE = 0.015, 0.6
-"""Relative change of a value up to which it does not matter, and the largest."""
-_FREE = 10.0
-"""Variance of what is common to both sets, in units of what one row determines. With 1 more unseen pairs got a wrong
-name; with 100 a change of mass in gentle flight is halved (docs/compare.md)."""
+MOST_CHANGE = 0.6
+"""The largest relative change of a value."""
 _UNCHANGED = "unchanged"
 """Kind of a term that is common to both sets and did not change by assumption."""
 _RIDGE = 1e-4
 """Ridge of the fit of all columns from which the leftover is learnt, in units of their length."""
-_ROUNDS = 4
-_HIDDEN_NATS = 1e4
-"""Nats that a change costs without the parameter that makes its form that form (a payload without a mass): none may be
-stated. Two such forms share what one alone should have where their columns have different noise."""
 
 
 def decide_changes(base: Evidence, new: Evidence, spread: np.ndarray) -> Found:
@@ -165,7 +158,8 @@ class Pair:
     def _rounds(self, variance: np.ndarray, decide: Callable[[np.ndarray], Found]) -> list[Found]:
         """What `decide` makes of a `variance` (C,) of the leftover, then of the one that it leaves, until it stays."""
         found: list[Found] = []
-        for _ in range(_ROUNDS):
+        rounds = 4
+        for _ in range(rounds):
             found.append(decide(variance))
             before, variance = variance, self.leftover(change_of(found[-1]))
             if np.array_equal(before, variance):
@@ -226,7 +220,10 @@ class Pair:
 
         Every effect may have changed, in any direction, and every value.
         """
-        prior, new, unit, usual = replace(self.prior, small_nats=_HIDDEN_NATS), self.new, self.unit, self.usual
+        # Nats that a change costs without the parameter that makes its form that form (a payload without a mass): none
+        # may be stated. Two such forms share what one alone should have where their columns have different noise.
+        hidden_nats = 1e4
+        prior, new, unit, usual = replace(self.prior, small_nats=hidden_nats), self.new, self.unit, self.usual
         size, rows = len(unit), self.spectra[1].rows
         terms = {t.key: _as_change(t) for t in new.terms}
         columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
@@ -316,7 +313,10 @@ def change_of(found: Found) -> np.ndarray:
 def _free_of(terms: Mapping[str, EvidenceTerm], columns_of: Mapping[str, np.ndarray], rows: int | float) -> np.ndarray:
     """Variance (K,) of the coefficients common to both sets, scaled; next to none of what one set has alone."""
     not_common = 1e-9  # The same of what only one set can have.
-    out = np.full(sum(t.size for t in terms.values()), _FREE * rows)
+    # Variance of what is common to both sets, in units of what one row determines. With 1 more unseen pairs got a wrong
+    # name; with 100 a change of mass in gentle flight is halved (docs/compare.md).
+    free = 10.0
+    out = np.full(sum(t.size for t in terms.values()), free * rows)
     for key, term in terms.items():
         if term.alone:
             out[columns_of[key]] = not_common
@@ -345,7 +345,8 @@ def _as_change(term: EvidenceTerm) -> EvidenceTerm:
     if term.kind != "value":
         return term
     name = NAMES[term.key]
-    least = least_gain if term.key.startswith("gain") else _LEAST_CHANGE
+    least_change = 0.015  # Relative change of a value up to which it does not matter.
+    least = least_gain if term.key.startswith("gain") else least_change
     change = LinearParameter(name, "1", -MOST_CHANGE, MOST_CHANGE, least)
     return replace(term, kind="effect", effect=name, linear=(change,))
 

@@ -21,25 +21,7 @@ from rotorid.mismatch.decide.statements import SURE
 from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.mismatch.evidence.comparison import VOTES_FROM
 
-_ACTS = 1 / 3
-"""Contribution to a channel, in units of its noise and relative to the strongest, from which an effect acts there."""
-_BLOCKS_S = (2.0, 1.0, 0.5, 0.25)
-"""Lengths of the blocks that the bootstrap draws, the first that gives LEAST_BLOCKS: residuals are alike for less."""
-_LEAST_BLOCKS = 6
-_BOOTSTRAPS = 400
-_LEAST_SHARE = 0.01
-"""Part of the explained error below which an effect is only suggested: names that fit unmodelled residual hold less
-than 0.7 % of what a model explains."""
-_LARGE_GAIN = 0.9
-"""Error with an effect over that without up to which its gain in a channel is large, however small its share of all."""
-_NEXT_TO_NO_GAIN = 0.998
-"""The same above which a gain is none, however significant."""
 NOTHING = "every number of it may be nothing"
-_NEAR_AN_END = 0.01
-"""Share of a range from its end at which a length or a damping is held there."""
-_LEAST_EXCITED = 0.1
-"""Size of a contribution on the held-out runs, relative to that on the fitted ones, below which they do not excite
-it."""
 
 
 _Ratio = tuple[float, float, float]
@@ -110,9 +92,15 @@ def judged(
         # What acts in a window of one run alone (a gust) belongs to that run and is reported there.
         windows = [_in_windows(t, finding.windows) for t in analysis.compared]
         reported, _ = contribution(analysis, without, windows, acts_on)
-    slight = found and next(iter(found.values()))[0] > _LARGE_GAIN
-    idle = found and min(ratio for ratio, *_ in found.values()) > _NEXT_TO_NO_GAIN
+    # Error with an effect over that without up to which its gain in a channel is large, however small its share of all.
+    large_gain = 0.9
+    slight = found and next(iter(found.values()))[0] > large_gain
+    next_to_no_gain = 0.998  # Error with an effect over that without from which its gain is none, however significant.
+    idle = found and min(ratio for ratio, *_ in found.values()) > next_to_no_gain
     reason = ""
+    # Part of the explained error below which an effect is only suggested: names that fit unmodelled residual hold less
+    # than 0.7 % of what a model explains.
+    least_share = 0.01
     if rules.BELOW_LEFTOVER(not beyond and not (analysis.command_path and finding.speed_form)):
         coarse = " or half a step of the reading" if _half_steps(analysis) else ""
         reason = f"it is smaller than what the model leaves over{coarse}"
@@ -120,7 +108,7 @@ def judged(
         reason = NOTHING
     elif _at_the_end_of_a_cable(finding):
         reason = "its cable or its damping is at the end of what is looked for"
-    elif rules.SLIGHT(bool(share < _LEAST_SHARE and slight and not finding.windows)):
+    elif rules.SLIGHT(bool(share < least_share and slight and not finding.windows)):
         reason = f"it takes {100 * share:.1f} % of the error that goes"
     elif rules.SLIGHT(bool(idle and not finding.windows)):
         reason = "it betters no channel by a five-hundredth"
@@ -144,7 +132,8 @@ def _at_the_end_of_a_cable(finding: Finding) -> bool:
         return False
     free = [(finding.form.parameters[i], finding.values[i]) for i in finding.form.nonlinear]
     ends = [(v, p.high - p.low, end) for p, v in free for end in ((p.low, p.high) if p.unit == "m" else (p.high,))]
-    return any(abs(v - end) < _NEAR_AN_END * span for v, span, end in ends)
+    near_an_end = 0.01  # Share of a range from its end at which a length or a damping is held there.
+    return any(abs(v - end) < near_an_end * span for v, span, end in ends)
 
 
 def lowered(finding: Finding, reason: str) -> Finding:
@@ -187,10 +176,15 @@ def contribution(
     here = {c: np.sqrt(s[0] / max(s[1], 1)) / noise[c] for c, s in size.items()}
     there = {c: np.sqrt(s[2] / max(s[3], 1)) / noise[c] for c, s in size.items()}
     strongest = max(here.values(), default=0.0)
-    if strongest <= _LEAST_EXCITED * max(there.values(), default=0.0):
+    # Size of a contribution on the held-out runs, relative to that on the fitted ones, below which they do not excite
+    # it.
+    least_excited = 0.1
+    if strongest <= least_excited * max(there.values(), default=0.0):
         return {}, True
     sensors = {t.channel for t in analysis.between_sensors}
-    differing = [c for c in here if here[c] > _ACTS * strongest]
+    # Contribution to a channel, in units of its noise and relative to the strongest, from which an effect acts there.
+    acts = 1 / 3
+    differing = [c for c in here if here[c] > acts * strongest]
     acting = [c for c in here if c in acts_on or (c in sensors and c in differing)] or differing
     ratios = {c: r for c in acting if (r := ratio_of(analysis, without, rows, c)) is not None}
     rounding = _half_steps(analysis)
@@ -222,14 +216,18 @@ def ratio_of(
     """
     parts = zip(analysis.compared, without, rows, strict=True)
     own = [(t, left - t.named, m) for t, left, m in parts if t.channel == channel]
-    for block_s in _BLOCKS_S:
+    # Lengths of the blocks that the bootstrap draws, the first that gives enough of them: residuals are alike for less.
+    blocks_s = (2.0, 1.0, 0.5, 0.25)
+    least_blocks = 6
+    for block_s in blocks_s:
         energies = np.array([e for t, added, m in own for e in _block_energies(t, added, m, block_s)]).reshape(-1, 3)
         acting = energies[energies[:, 2] > VOTES_FROM * energies[:, 2].max(initial=0.0)]
-        if len(acting) >= _LEAST_BLOCKS:
+        if len(acting) >= least_blocks:
             break
     else:
         return None
-    draws = acting[np.random.default_rng(1).integers(0, len(acting), (_BOOTSTRAPS, len(acting)))].sum(axis=1)
+    bootstraps = 400
+    draws = acting[np.random.default_rng(1).integers(0, len(acting), (bootstraps, len(acting)))].sum(axis=1)
     low, high = np.quantile(np.sqrt(draws[:, 0] / np.maximum(draws[:, 1], 1e-300)), [0.025, 0.975])
     value = np.sqrt(acting[:, 0].sum() / max(acting[:, 1].sum(), 1e-300))
     return float(value), float(low), float(high)

@@ -23,19 +23,6 @@ from rotorid.mismatch.evidence.regression import limited_bias
 
 Model = tuple[str, ...]
 """Keys of the effects at work, sorted."""
-_RIDGE = 1e-9
-"""Ridge, in units of the diagonal, where the correction for noisy regressors is left out."""
-_MOST_SCORED = 8
-"""Moves of a kind that are scored exactly."""
-_MOST_MOVES = 60
-_AT_ONCE = 64
-"""Models that are ranked in one call: what stays in the processor's memory."""
-_LEFTOVER_ROUNDS = 5
-"""Rounds of model and leftover at most, should the two go on in a circle."""
-_LEAST_GAIN = 0.05
-"""Nats by which a move must be better, so that the search ends."""
-_WORST_RANKED = -5.0
-"""Nats below the present model, as ranked, from which a move is not scored: the ranking is off by less."""
 
 
 @dataclass(frozen=True)
@@ -145,6 +132,7 @@ def _modes(
     units, at = sd[:, :, None] * sd[:, None, :], (slice(None), np.arange(size), np.arange(size))
     normal = gram - bias
     normal[at] += 1.0 / sd**2
+    ridge = 1e-9  # Ridge, in units of the diagonal, where the correction for noisy regressors is left out.
     try:
         triangle = np.linalg.cholesky(normal * units)
     except np.linalg.LinAlgError:
@@ -152,7 +140,7 @@ def _modes(
             return one_by_one()
         # The correction for noisy regressors may overshoot: without it.
         normal = gram.copy()
-        normal[at] += _RIDGE * gram[at] + 1.0 / sd**2
+        normal[at] += ridge * gram[at] + 1.0 / sd**2
         try:
             triangle = np.linalg.cholesky(normal * units)
         except np.linalg.LinAlgError:
@@ -274,7 +262,8 @@ def _settled(
 ) -> Found:
     """The most probable model and its leftover, from a leftover of `variance` (C,) and each of the models `known`."""
     starts: dict[Model, None] = dict.fromkeys([(), *known])
-    for _ in range(_LEFTOVER_ROUNDS):
+    leftover_rounds = 5  # Rounds of model and leftover at most, should the two go on in a circle.
+    for _ in range(leftover_rounds):
         found = most_probable(problem_of(evidence, spectrum, variance, prior), starts)
         before, variance = variance, found.posterior.leftover_of(found.model, spectrum)
         starts = dict.fromkeys([found.model, *starts])
@@ -294,7 +283,8 @@ def most_probable(problem: Problem, starts: Iterable[Model]) -> Found:
 def _climbed(posterior: Posterior, start: Model) -> Model:
     """The model in which a search ends that starts from another; from nothing where that one has no mode."""
     model = tuple(sorted(start)) if np.isfinite(posterior(start)) else ()
-    for _ in range(_MOST_MOVES):
+    most_moves = 60
+    for _ in range(most_moves):
         better = _best_of(posterior, model, _single_moves(posterior.problem, model))
         better = better or _best_of(posterior, model, _exchanges(posterior.problem, model))
         if better is None:
@@ -311,9 +301,10 @@ def ranked(problem: Problem, models: Sequence[Model]) -> np.ndarray:
         columns = problem.columns(model)
         freed = tuple(k for k in model if k in problem.freed)
         alike.setdefault((len(columns), freed), []).append((i, columns))
+    at_once = 64  # Models that are ranked in one call: what stays in the processor's memory.
     for (_, freed), own in alike.items():
-        for first in range(0, len(own), _AT_ONCE):
-            at, columns = zip(*own[first : first + _AT_ONCE], strict=True)
+        for first in range(0, len(own), at_once):
+            at, columns = zip(*own[first : first + at_once], strict=True)
             out[list(at)] = _log_evidences(problem, np.array(columns), problem.believed(freed))
     return out + np.array([log_prior(problem, model) for model in models])
 
@@ -323,10 +314,14 @@ def _best_of(posterior: Posterior, model: Model, moves: Sequence[Model]) -> Mode
     here, *others = ranked(posterior.problem, [model, *moves])
     gains = [value - here for value in others]
     best, found = posterior(model), None
-    for k in sorted(range(len(moves)), key=lambda k: (gains[k], k), reverse=True)[:_MOST_SCORED]:
-        if gains[k] < _WORST_RANKED:
+    most_scored = 8  # Moves of a kind that are scored exactly.
+    least_gain = 0.05  # Nats by which a move must be better, so that the search ends.
+    # Nats below the present model, as ranked, from which a move is not scored: the ranking is off by less.
+    worst_ranked = -5.0
+    for k in sorted(range(len(moves)), key=lambda k: (gains[k], k), reverse=True)[:most_scored]:
+        if gains[k] < worst_ranked:
             break
-        if (value := posterior(moves[k])) > best + _LEAST_GAIN:
+        if (value := posterior(moves[k])) > best + least_gain:
             best, found = value, moves[k]
     return found
 

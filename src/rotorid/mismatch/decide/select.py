@@ -36,22 +36,13 @@ SHARE_OF_LARGEST = rules.OVERSHADOWED["share"]
 COST_PER_EFFECT = 20.0
 """Whitened squares that a further id must explain before two ids are preferred to one form of one of them."""
 _COST_OF_UNKNOWN = 40.0
-"""Whitened squares, and SHARE_OF_UNKNOWN of what it explains, that an empirical term pays for having no name."""
-_SHARE_OF_UNKNOWN = 0.1
-_ALTERNATIVE_P = 0.01
-"""A term that given an alternative is less significant than this could be that alternative instead."""
-_INSTEAD_P = 1e-3
-"""It must itself be as significant as this in the other's place."""
-_MOST_EXTRA_PARAMETERS = 3
-"""An alternative with more further parameters than this explains by its freedom, not by its cause."""
+"""Whitened squares, and a tenth of what it explains, that an empirical term pays for having no name."""
 _MOST_EFFECTS = 10
 VALUE_FLOOR = 0.002
 """Relative one-sigma that no estimate here is better than (filters, timing): of two effects that explain the same but
 for twice as much neither explains more."""
 _MOST_JUDGED = 20_000
 """Terms in models of which a search remembers what it said."""
-_MOST_TRIALS = 12
-"""Exchanges looked at closely, the most promising first."""
 LEAST_TRANSFER = rules.TRANSFER["share"]
 LEAST_PROMISE = rules.TRANSFER["promise"]
 NEAR_LIMIT = 0.98
@@ -78,7 +69,8 @@ class _JudgedTerm:
     def score(self) -> float:
         """Gain less what its parameters cost; noise that is larger than assumed makes both larger."""
         score = self.gain - COST_PER_PARAMETER * self.inflation * len(self.beta)
-        return score if self.named else (1 - _SHARE_OF_UNKNOWN) * score - _COST_OF_UNKNOWN * self.inflation
+        share_of_unknown = 0.1
+        return score if self.named else (1 - share_of_unknown) * score - _COST_OF_UNKNOWN * self.inflation
 
 
 @dataclass
@@ -302,7 +294,8 @@ class Search:
                     for other, worth in zip(others, worths, strict=True)
                     if worth > least
                 ]
-        for _, new, trial in sorted(trials, key=lambda t: -t[0])[:_MOST_TRIALS]:
+        most_trials = 12  # Exchanges looked at closely, the most promising first.
+        for _, new, trial in sorted(trials, key=lambda t: -t[0])[:most_trials]:
             if self.failing(new, trial)[0] is None and all(self.judge(key, trial).physical for key in trial):
                 return trial
         return None
@@ -506,8 +499,13 @@ class Search:
     def _replaces(self, other: str, own: _JudgedTerm, rest: list[str]) -> bool:
         """Whether given another term alone one of the model is no longer needed."""
         instead = self.judge(other, rest)
-        if not instead.physical or instead.p_value > _INSTEAD_P or instead.gain < 0.5 * own.gain:
+        instead_p = 1e-3  # It must itself be as significant as this in the other's place.
+        if not instead.physical or instead.p_value > instead_p or instead.gain < 0.5 * own.gain:
             return False
-        if len(instead.beta) > len(own.beta) + _MOST_EXTRA_PARAMETERS:
+        # An alternative with more further parameters than this explains by its freedom, not by its cause.
+        most_extra_parameters = 3
+        if len(instead.beta) > len(own.beta) + most_extra_parameters:
             return False
-        return self.judge(own.key, [*rest, other]).p_value > _ALTERNATIVE_P
+        # A term that given an alternative is less significant than this could be that alternative instead.
+        alternative_p = 0.01
+        return self.judge(own.key, [*rest, other]).p_value > alternative_p

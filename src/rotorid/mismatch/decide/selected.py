@@ -19,21 +19,11 @@ from rotorid.mismatch.evidence.rows import CHANNELS, Contributions, Rows, Term
 from rotorid.mismatch.evidence.speedpath import SpeedResult
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 
-_COST_PER_VALUE = 12.0
-"""Whitened squares that a further wrong value must explain."""
-_MOST_VALUES = 3
-_LEAST_ROOM = 0.6
-"""A value that is asked whether it is wrong may be so by this share at least; in the search it has less room, or it
-would take physics up."""
-_MOST_DISTRUST = 9.0
 WIDEST_TRUST = 0.1
-_VALUE_P = 5e-4
 VALUE_Z = 3.5
 """A believed value is called wrong beyond this many standard errors: about 1 in 300 over seven values."""
 SMALLEST_CHANGE = 0.015
 """A relative change below this is no wrong value: no laboratory knows its numbers better."""
-_BEST_KNOWN = 0.004
-"""Relative one-sigma that no believed value is taken to be better known than, while others are called wrong."""
 
 
 Factors = tuple[np.ndarray, np.ndarray]
@@ -221,35 +211,45 @@ def wrong_values(
     """The fewest believed values that must change: relative change and one-sigma.
 
     Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
-    counts, but only up to MOST_DISTRUST per value: a number may be far off, and a wrong mass must not be
+    counts, but only up to `most_distrust` per value: a number may be far off, and a wrong mass must not be
     sold as a wrong thrust and three wrong inertias. A value is named only where it matters: SMALLEST_CHANGE, and a size
     in units of the noise (`size_of(key, relative change)`). `moving` is False on a stand, where a mass only weighs;
     `refused` values are not called wrong.
     """
-    regression = regression.with_room(_LEAST_ROOM)
+    # A value that is asked whether it is wrong may be so by this share at least; in the search it has less room, or it
+    # would take physics up.
+    least_room = 0.6
+    regression = regression.with_room(least_room)
     nuisance = regression.keys_of("nuisance", "wind")
     trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
     always = nuisance + selection.active
     loose = {key: max(sd, WIDEST_TRUST) for key, sd in trust.items()}
     count = int(regression.training.sum())
 
+    cost_per_value = 12.0  # Whitened squares that a further wrong value must explain.
+    most_distrust = 9.0
+    # Relative one-sigma that no believed value is taken to be better known than, while others are called wrong.
+    best_known = 0.004
+
     def penalised(keys: list[str]) -> float:
         # The others give by a fraction of a percent, or a third value would be called wrong to make up for it.
-        room = {k: loose[k] if k in keys else min(_BEST_KNOWN, sd) for k, sd in trust.items()}
+        room = {k: loose[k] if k in keys else min(best_known, sd) for k, sd in trust.items()}
         fit = regression.fit([*always, *trust], loose=room)
         cost = 0.0
         for key in trust:
             change = coefficients(regression, fit, key)[0][0]
             if key in keys:
-                cost += _COST_PER_VALUE + min((change / trust[key]) ** 2, _MOST_DISTRUST)
+                cost += cost_per_value + min((change / trust[key]) ** 2, most_distrust)
             else:
                 cost += (change / room[key]) ** 2
         return fit.gain - cost
 
-    subsets = [list(c) for size in range(_MOST_VALUES + 1) for c in combinations(trust, size)]
+    most_values = 3
+    subsets = [list(c) for size in range(most_values + 1) for c in combinations(trust, size)]
     best_first = sorted(subsets, key=penalised, reverse=True)
     doubtful = set(refused)
     at_limits: list[list[str]] = []
+    value_p = 5e-4
     while named := next(s for s in best_first if s not in at_limits and not doubtful.intersection(s)):
         fit = regression.fit(always + named, loose=loose)
         certainty, pinned = {}, False
@@ -260,7 +260,7 @@ def wrong_values(
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > NEAR_LIMIT * regression.limit[regression.start[key]]
-            if abs(change) < VALUE_Z * sd or p > _VALUE_P or noisy or not matters:
+            if abs(change) < VALUE_Z * sd or p > value_p or noisy or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:
             # Two values that run away together say nothing against either of them alone.

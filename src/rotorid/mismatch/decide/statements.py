@@ -22,27 +22,12 @@ from rotorid.mismatch.evidence.gram import TINY, Evidence, Spectrum
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 
 PROBABILITY = 0.95
-_DRAWS = 400
-_LEAST_KNOWN = 1e-9
-"""Least variance of scaled coefficients in any direction."""
 FORM_SD = 0.02
 """Share of what effects contribute that their forms are wrong by."""
 _ROUNDS = 3
 """Rounds of learning the leftover from what the model leaves, and of looking at better models nearby."""
-_Z95 = 1.959963984540054
-_CONSIDERED = 10.0
-"""Nats below the best model up to which others count: together they hold less than a percent."""
-_MOST_SUBSTITUTES = 6
-"""Ids that are tried exactly in another's place, the most promising first."""
-_WORST_SUBSTITUTE = -8.0
-"""Nats, as ranked, from which one is not tried."""
 SURE, LIKELY, _POSSIBLE = 0.99, 0.5, 0.05
 """Probabilities from which an id (a class) is established (ambiguous), suggested, or looked at and not established."""
-_STATED_REACH = 10.0
-"""Times as wide a prior as models are compared by, for the numbers of a change: they shrink by a percent at most where
-they did by a half."""
-_MOST_MEMBERS = 4
-"""Ids of a class at most: more say no more than that something is off."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +87,11 @@ def statements_of(found: Found, of_change: bool = False, form_sd: float = 0.0) -
 def widened(problem: Problem) -> Problem:
     """A problem with priors of all effects that are wide enough to state their numbers with."""
     sd = problem.prior_sd.copy()
+    # Times as wide a prior as models are compared by, for the numbers of a change: they shrink by a percent at most
+    # where they did by a half.
+    stated_reach = 10.0
     for key in problem.effects:
-        sd[problem.columns_of[key]] *= _STATED_REACH
+        sd[problem.columns_of[key]] *= stated_reach
     return replace(problem, prior_sd=sd)
 
 
@@ -151,7 +139,8 @@ def smallest_class(
     """The fewest ids, `members` and some of `others`, of which one is at work by a share that is enough; of four at
     most, as sure as it gets."""
     found, left = set(members), set(others) - set(members)
-    while left and share(found) < enough and len(found) < _MOST_MEMBERS:
+    most_members = 4  # Ids of a class at most: more say no more than that something is off.
+    while left and share(found) < enough and len(found) < most_members:
         best = max(sorted(left), key=lambda other: share({*found, other}))
         found.add(best)
         left.remove(best)
@@ -160,7 +149,8 @@ def smallest_class(
 
 def weights_of(found: Found) -> dict[Model, float]:
     """Probability of every visited model that is near the best."""
-    near = {m: v for m, v in found.posterior.visited.items() if v > found.log_posterior - _CONSIDERED}
+    considered = 10.0  # Nats below the best model up to which others count: together they hold less than a percent.
+    near = {m: v for m, v in found.posterior.visited.items() if v > found.log_posterior - considered}
     weight = {m: float(np.exp(v - found.log_posterior)) for m, v in near.items()}
     total = sum(weight.values())
     return {m: w / total for m, w in weight.items()}
@@ -207,8 +197,10 @@ def _substitutes(found: Found, key: str) -> tuple[str, ...]:
     here, *others = ranked(problem, [found.model, *instead])
     gains = {trial: value - here for trial, value in zip(instead, others, strict=True)}
     out = set()
-    for trial in sorted(instead, key=lambda t: -gains[t])[:_MOST_SUBSTITUTES]:
-        if gains[trial] <= _WORST_SUBSTITUTE:
+    most_substitutes = 6  # Ids that are tried exactly in another's place, the most promising first.
+    worst_substitute = -8.0  # Nats, as ranked, from which one is not tried.
+    for trial in sorted(instead, key=lambda t: -gains[t])[:most_substitutes]:
+        if gains[trial] <= worst_substitute:
             break
         if found.posterior(trial) - found.log_posterior > -problem.prior.open_nats:
             out.add(instead[trial])
@@ -274,7 +266,8 @@ def parameters(problem: Problem, at: Scored, key: str, form_sd: float = 0.0) -> 
     where, unit = places(at.columns, own), problem.unit[own]
     beta = at.mode.beta[where] * unit
     sd = np.sqrt(np.maximum(np.diag(at.mode.covariance)[where], 0.0)) * unit
-    reach = _Z95 * np.hypot(sd, form_sd * beta)
+    z95 = 1.959963984540054
+    reach = z95 * np.hypot(sd, form_sd * beta)
     out = []
     for k, parameter in enumerate(term.linear):
         moved = (np.where(np.arange(len(beta)) == k, beta + step, beta) for step in (0.0, -reach, reach))
@@ -375,6 +368,8 @@ def drawn(mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.nd
     """
     unit = np.sqrt(np.maximum(np.diag(covariance), TINY))
     values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
-    root = unit[:, None] * np.linalg.cholesky((vectors * np.maximum(values, _LEAST_KNOWN)) @ vectors.T)
-    normal = np.random.default_rng(0).standard_normal((_DRAWS, len(mean)))
+    least_known = 1e-9  # Least variance of scaled coefficients in any direction.
+    root = unit[:, None] * np.linalg.cholesky((vectors * np.maximum(values, least_known)) @ vectors.T)
+    draws = 400
+    normal = np.random.default_rng(0).standard_normal((draws, len(mean)))
     return np.clip(mean + normal @ root.T, low, high)

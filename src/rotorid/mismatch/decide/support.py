@@ -25,8 +25,6 @@ from rotorid.mismatch.evidence.regression import Regression
 DRAWS = 20
 _NEAR = 60.0
 """Nats below the chosen model up to which a draw may prefer another one."""
-_RANKED_NEAR = 15.0
-"""Nats below a draw's best model, as ranked, up to which one is scored exactly: the ranking is off by some five."""
 _REPLACES = 2.0
 """Times as often as jointly with another that a name must be at work without it, to stand in its place."""
 
@@ -93,11 +91,13 @@ def support_of(evidence: Evidence, spectrum: Spectrum, found: Found) -> Support:
     """
     near = sorted(m for m, value in found.posterior.visited.items() if value > found.log_posterior - _NEAR)
     terms, shares = found.problem.terms, {}
+    # Nats below a draw's best model, as ranked, up to which one is scored exactly: the ranking is off by some five.
+    ranked_near = 15.0
     for problem in _drawn(evidence, spectrum, found.problem):
         posterior = Posterior(problem)
         about = ranked(problem, near)
         for m, value in zip(near, about, strict=True):
-            if value > about.max() - _RANKED_NEAR:
+            if value > about.max() - ranked_near:
                 posterior(m)
         best = max(posterior.visited, key=posterior.visited.__getitem__)
         for model, weight in weights_of(Found(posterior, best, posterior(best))).items():

@@ -29,9 +29,6 @@ _PLAINEST_FIRST = (
 )
 """Candidates by how much of them has no cause: derivatives next to named physics have less to say than those in its
 place."""
-_DRAWS = 400
-_WORTH = 0.03
-"""Logarithm of an error below which derivatives gain nothing that shows in flight."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +118,8 @@ def compared(candidates: Sequence[Candidate], ground: Ground) -> list[CandidateS
     every = [[ground.squares(c.left[:, known]), *([c.flown] if len(c.flown) else [])] for c in ordered]
     squares = np.array([np.concatenate(parts) for parts in every])
     units = squares.shape[-1]
-    drawn = np.random.default_rng(0).integers(0, units, (_DRAWS, units))
+    draws = 400
+    drawn = np.random.default_rng(0).integers(0, units, (draws, units))
     weights = np.array([np.ones(units), *(np.bincount(d, minlength=units) for d in drawn)])
     scores = _mean_logarithm((squares @ weights.T).transpose(0, 3, 1, 2))
     best = int(np.argmin(scores[:, 0]))
@@ -135,7 +133,8 @@ def compared(candidates: Sequence[Candidate], ground: Ground) -> list[CandidateS
 
 def _least_gain(plain: CandidateScore, best: CandidateScore) -> float:
     """By how much the best must be ahead of a plainer one, if by derivatives alone."""
-    return _WORTH if best.candidate.learnt is not None and plain.candidate.learnt is None else 0.0
+    worth = 0.03  # Logarithm of an error below which derivatives gain nothing that shows in flight.
+    return worth if best.candidate.learnt is not None and plain.candidate.learnt is None else 0.0
 
 
 def choose(

@@ -20,15 +20,6 @@ from rotorid.vehicle.derivatives import CHANNELS, CONTROLS, QUANTITIES, table_of
 
 _PENALTIES = 10.0 ** np.arange(-4.0, 3.5, 0.5)
 """Of the ridge, times the number of rows; quantities are standardised."""
-_MOST_LEFT = 0.9
-"""Share of the squares where not fitted that derivatives may leave of a channel."""
-_HELPS_IN = 0.5
-"""Share of the folds in which they must leave less: what seven laboratories choose for the eighth, each in turn."""
-_EDGE = 0.002
-"""Share of the rows beyond each edge at which a quantity is held."""
-_LEAST_FOLDS = 3
-_LEAST_GAIN = 0.3
-"""Share of what is asked that rotors make at least: less is what a controller leaves that cancels a disturbance."""
 _LEVELLED = ("force_x", "force_y")
 _DAMPED_BY = ("u", "v", "w", "p", "q", "r")
 """Of each channel the quantity that its own motion is: X_u, Y_v, Z_w, L_p, M_q and N_r are damping, or nothing."""
@@ -76,9 +67,11 @@ def learn(
     rows &= np.isfinite(x[:, known]).all(axis=1)
     folds = [np.flatnonzero(rows & (fold == k)) for k in np.unique(fold[rows])]
     left_out = np.zeros((len(x), len(CHANNELS)))
-    if len(folds) < _LEAST_FOLDS or known.sum() < 2:
+    least_folds = 3
+    if len(folds) < least_folds or known.sum() < 2:
         return Learnt((), left_out)
-    low, high = np.quantile(x[rows][:, known], [_EDGE, 1.0 - _EDGE], axis=0)
+    edge = 0.002  # Share of the rows beyond each edge at which a quantity is held.
+    low, high = np.quantile(x[rows][:, known], [edge, 1.0 - edge], axis=0)
     held = np.clip(x[:, known], low, high)
     middle, scale = held[rows].mean(axis=0), held[rows].std(axis=0)
     middle[0], scale[0] = 0.0, 1.0
@@ -142,7 +135,9 @@ def _exogenous(state: np.ndarray, asked: np.ndarray, left: np.ndarray) -> bool:
     """
     asked, felt = (v - state @ np.linalg.lstsq(state, v, rcond=None)[0] for v in (asked, asked + left))
     both = float(asked @ felt)
-    if both <= _LEAST_GAIN * float(asked @ asked):
+    # Share of what is asked that rotors make at least: less is what a controller leaves that cancels a disturbance.
+    least_gain = 0.3
+    if both <= least_gain * float(asked @ asked):
         return False
     first, last = both / float(asked @ asked) - 1.0, float(felt @ felt) / both - 1.0
     return first * last > 0 and abs(first) <= 2.0 * abs(last)
@@ -175,7 +170,10 @@ def _ridge(
             b[0] = b[1:] @ level[kept][1:]
     left = np.array([((y - x @ b) ** 2).sum() for (x, y), b in zip(parts, without, strict=True)])
     own = np.array([float(y @ y) for _, y in parts])
-    pays = left.sum() < _MOST_LEFT * own.sum() and np.mean(left < own) >= _HELPS_IN
+    most_left = 0.9  # Share of the squares where not fitted that derivatives may leave of a channel.
+    # Share of the folds in which they must leave less: what seven laboratories choose for the eighth, each in turn.
+    helps_in = 0.5
+    pays = left.sum() < most_left * own.sum() and np.mean(left < own) >= helps_in
     beta, others = np.zeros(len(kept)), np.zeros((len(parts), len(kept)))
     beta[kept], others[:, kept] = whole, without
     return beta, others, float(_PENALTIES[best]) if pays else None

@@ -31,8 +31,6 @@ from rotorid.recordings import Split, Vehicle
 from rotorid.steps import step
 from rotorid.vehicle.derivatives import about_hover_of, own_controls
 
-_ONLY_A_RATIO = 0.9
-"""Correlation of two values' estimates from which little more than their ratio is known."""
 Stretches = Sequence[tuple[str, np.ndarray, np.ndarray]]
 """Of every stretch its run, the instants of its rows (n,), s, and the quantities of derivatives at them, (n, 12)."""
 
@@ -317,7 +315,7 @@ def delivered_value(improved: Vehicle, believed: Vehicle, key: str) -> float:
 
 
 def _value_correlations(offered: Choice) -> dict[tuple[str, str], float]:
-    """Correlations of two values' estimates from ONLY_A_RATIO on, trust left out: what the recordings alone know."""
+    """Correlations of two values' estimates from `only_a_ratio` on, trust left out: what the recordings alone know."""
     model, named, names = offered.model, offered.named, offered.names
     keys = model.values_beside(named.active)
     loose = dict.fromkeys(keys, 1.0)
@@ -328,4 +326,5 @@ def _value_correlations(offered: Choice) -> dict[tuple[str, str], float]:
     correlation = covariance / np.outer(sd, sd)
     pairs = combinations(range(len(keys)), 2)
     known = {(names[keys[i]], names[keys[j]]): float(correlation[i, j]) for i, j in pairs}
-    return {pair: r for pair, r in known.items() if abs(r) > _ONLY_A_RATIO}
+    only_a_ratio = 0.9  # Correlation of two values' estimates from which little more than their ratio is known.
+    return {pair: r for pair, r in known.items() if abs(r) > only_a_ratio}

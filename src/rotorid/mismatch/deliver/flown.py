@@ -24,8 +24,6 @@ from rotorid.vehicle.improved import ActiveForm, active_forms, all_forms
 from rotorid.vehicle.windows import Inputs, States, Windows, plan_windows, simulate_windows, usable
 
 UNITS = {"position": "m", "velocity": "m/s", "attitude": "rad", "angular_velocity": "rad/s"}
-_FARTHEST = 1e6
-"""Error, in any unit, at which a simulation that runs away is taken to end."""
 
 
 @dataclass(frozen=True)
@@ -158,6 +156,7 @@ def squares_of_windows(
     where models are learnt without it; what drives them is that of `model`.
     """
     out = np.zeros((len(UNITS), 2, units))
+    farthest = 1e6  # Error, in any unit, at which a simulation that runs away is taken to end.
     for segment, inputs, states in zip(segments, *driven_by(segments, model), strict=True):
         time_s = segment.motion.time_s
         plan = plan_windows(time_s, WINDOW_S, None, usable(inputs, states))
@@ -171,7 +170,7 @@ def squares_of_windows(
             errors = _window_errors(segment, inputs, states, flown, plan[part]).channels
             for number, name in enumerate(UNITS):
                 if name in errors:
-                    square = (np.nan_to_num(np.minimum(errors[name], _FARTHEST), nan=_FARTHEST) ** 2).mean(axis=1)
+                    square = (np.nan_to_num(np.minimum(errors[name], farthest), nan=farthest) ** 2).mean(axis=1)
                     out[number] += [np.bincount(own[part], square, units), np.bincount(own[part], None, units)]
     return out[out[:, 1].sum(axis=1) > 0]
 

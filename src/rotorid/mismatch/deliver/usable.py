@@ -35,16 +35,7 @@ from rotorid.vehicle.exports import export_vehicle
 from rotorid.vehicle.exports.forms import FORMS
 from rotorid.vehicle.improved import command_path, flyable, wrench_at_rest, wrench_of_command
 
-_MOST_HOVER_SHARE = 0.9
-"""Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""
 _HIGH_ABOVE_GROUND_M = 1e3
-_MOST_TRIM = 0.1
-"""Share of the weight that a constant force of the derivatives may be: more is lift that the rotors do not make."""
-_BEYOND_ALL = 1e6
-"""Weights that no rotors lift: asked for, each turns at its limit."""
-_CARRIES = (0.7, 1.4)
-"""Upward force at the recorded rotor speeds, over what was felt with them, that a vehicle which flies like the recorded
-one may make: airspeed and climb change the thrust at the same speed by some ten percent."""
 _LIGHT = 0.5
 """Share of the largest recorded thrust below which a vehicle is not taken to be in the air."""
 
@@ -91,8 +82,10 @@ def _by_its_rotors(vehicle: Vehicle) -> Vehicle:
 def _held_by_a_constant(vehicle: Vehicle) -> str:
     """Which constant force would carry it; empty where all are trims."""
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    # Share of the weight that a constant force of the derivatives may be: more is lift that the rotors do not make.
+    most_trim = 0.1
     for d in vehicle.derivatives:
-        if d.quantity == "constant" and d.channel.startswith("force") and abs(d.value) > _MOST_TRIM * weight:
+        if d.quantity == "constant" and d.channel.startswith("force") and abs(d.value) > most_trim * weight:
             share = 100 * abs(d.value) / weight
             return f"its derivatives hold a constant {d.channel} of {d.value:.3g} N, {share:.0f} % of its weight"
     return ""
@@ -134,7 +127,8 @@ def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:
     if most is None:
         return ""
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
-    allowed = max(_MOST_HOVER_SHARE, recorded_share)
+    most_hover_share = 0.9  # Share of the full thrust at which a vehicle may hover: what steers it needs the rest.
+    allowed = max(most_hover_share, recorded_share)
     if weight <= allowed * most:
         return ""
     return (
@@ -173,7 +167,10 @@ def _off_as_recorded(vehicle: Vehicle, recorded: tuple[np.ndarray, str, float] |
     path = None if group == "rotor_speed" else command_path(flown)
     up = wrench_of_command(flown, path, speed_rad_s, _HIGH_ABOVE_GROUND_M)[0]
     share = float(up) / (vehicle.mass_kg * specific_force_m_s2)
-    if _CARRIES[0] <= share <= _CARRIES[1]:
+    # Upward force at the recorded rotor speeds, over what was felt with them, that a vehicle which flies like the
+    # recorded one may make: airspeed and climb change the thrust at the same speed by some ten percent.
+    carries = (0.7, 1.4)
+    if carries[0] <= share <= carries[1]:
         return ""
     return f"at the rotor speeds that were recorded it makes {share:.2g} times the upward force that was felt"
 
@@ -187,7 +184,8 @@ def full_thrust_n(vehicle: Vehicle) -> float | None:
     if vehicle.rotor_speed_limits_rad_s is None:
         return None
     flown = flyable(vehicle)[0]
-    asked = np.array([_BEYOND_ALL * vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0])
+    beyond_all = 1e6  # Weights that no rotors lift: asked for, each turns at its limit.
+    asked = np.array([beyond_all * vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0])
     try:
         return float(wrench_at_rest(flown, command_path(flown), asked, _HIGH_ABOVE_GROUND_M)[0])
     except InputError:

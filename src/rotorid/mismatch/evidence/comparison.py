@@ -27,30 +27,15 @@ import numpy as np
 from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
-_BLOCK_S = 2.0
-_ALARM_P = 1e-6
-_SMALLEST_SHARE_OF_NOISE = 0.5
-"""Distance of a run's mean from the others', in units of the noise, below which it is not worth a word."""
-_LEAST_BLOCKS = 8
 CHANNELS_OF_WRENCH = 6
 ENVIRONMENT_S = 5.0
 """Length of an environment, s."""
 LEAST_ENVIRONMENTS = 6
 """Fewer environments of ENVIRONMENT_S are made shorter ones, so that something is left to compare."""
-_SHORTEST_S = 1.0
-_MOST_FOLDS = 8
 LEAST_RUNS = 3
 """Fitted runs from which whole runs are left out."""
 VOTES_FROM = 0.05
 """Predicted gain of an environment, relative to the largest of all, from which it votes."""
-_LEAST_EXPECTED = 0.6
-"""Share of the promise that a true effect must be expected to keep on blocks left out, for these to judge: what one run
-alone excites cannot be learnt from the others."""
-_SEEN_ELSEWHERE = 1.0
-"""What the fitted blocks must hold of the same change, relative to what is asked of the blocks left out: no form is
-so true that what slow flights say of it could be held against a fast one."""
-_ANSWERED = 0.5
-"""Share of all that is promised on environments that may judge, from which leaving out whole runs is an answer."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +62,21 @@ class Comparison:
         more than there is and gains e less.
         """
         asked, off = (np.array([x[self.fold == f].sum() for f in self.fold]) for x in (self.promised, self.doubt))
-        return (self.seen >= _SEEN_ELSEWHERE * asked) & (asked - 2 * off >= _LEAST_EXPECTED * asked)
+        # Share of the promise that a true effect must be expected to keep on blocks left out, for these to judge: what
+        # one run alone excites cannot be learnt from the others.
+        least_expected = 0.6
+        # What the fitted blocks must hold of the same change, relative to what is asked of the blocks left out: no form
+        # is so true that what slow flights say of it could be held against a fast one.
+        seen_elsewhere = 1.0
+        return (self.seen >= seen_elsewhere * asked) & (asked - 2 * off >= least_expected * asked)
 
     @property
     def answers(self) -> bool:
         """Whether enough of what is promised lies where it may be judged."""
         whole = float(self.promised.sum())
-        return float(self.promised[self.judges].sum()) >= _ANSWERED * whole if whole > 0 else False
+        # Share of all that is promised on environments that may judge, from which leaving out whole runs is an answer.
+        answered = 0.5
+        return float(self.promised[self.judges].sum()) >= answered * whole if whole > 0 else False
 
     @property
     def votes(self) -> np.ndarray:
@@ -119,7 +112,8 @@ class Comparison:
 def environments(run: np.ndarray, seconds: float) -> np.ndarray:
     """Number of the environment of every block (n,), given its run's number and the blocks' length in seconds."""
     total = len(run) * seconds
-    length = max(_SHORTEST_S, min(ENVIRONMENT_S, total / LEAST_ENVIRONMENTS))
+    shortest_s = 1.0
+    length = max(shortest_s, min(ENVIRONMENT_S, total / LEAST_ENVIRONMENTS))
     per = max(1, int(round(length / seconds)))
     out, at = np.zeros(len(run), int), 0
     for number in np.unique(run):
@@ -132,9 +126,10 @@ def environments(run: np.ndarray, seconds: float) -> np.ndarray:
 
 def folds(environment: np.ndarray, run: np.ndarray, whole_runs: bool) -> np.ndarray:
     """Fold of every block (n,): blocks of one fold are left out together, whole runs or environments in turn."""
+    most_folds = 8
     if whole_runs:
-        return np.searchsorted(np.unique(run), run) % _MOST_FOLDS
-    return environment % min(_MOST_FOLDS, int(environment.max(initial=0)) + 1)
+        return np.searchsorted(np.unique(run), run) % most_folds
+    return environment % min(most_folds, int(environment.max(initial=0)) + 1)
 
 
 def growth(
@@ -142,7 +137,7 @@ def growth(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ratio of the held-out errors after and before of each wrench channel, and its growth in standard errors.
 
-    Squares are compared by blocks of `per` rows; without LEAST_BLOCKS of them nothing is said (ratio 1, growth 0).
+    Squares are compared by blocks of `per` rows; without enough of them nothing is said (ratio 1, growth 0).
     """
     blocks = []
     for b, a, mask in zip(before, after, held, strict=True):
@@ -161,8 +156,9 @@ def growth(
 
 
 def _long_enough(held: list[np.ndarray], per: int) -> bool:
-    """Whether there are LEAST_BLOCKS of `per` rows held out."""
-    return sum(int(mask.sum()) // per for mask in held) >= _LEAST_BLOCKS
+    """Whether there are enough blocks of `per` rows held out."""
+    least_blocks = 8
+    return sum(int(mask.sum()) // per for mask in held) >= least_blocks
 
 
 @dataclass(frozen=True)
@@ -181,7 +177,10 @@ class DifferingMeans:
 def apart(runs: Sequence[str], parts: Sequence[np.ndarray], rate_hz: float, noise: float) -> DifferingMeans | None:
     """Means of stretches (n,), each of a run, where runs differ beyond doubt and matter; None where they do not."""
     means, p_value = compared(runs, parts, rate_hz)
-    if p_value > _ALARM_P or np.ptp(list(means.values())) < 2 * _SMALLEST_SHARE_OF_NOISE * noise:
+    alarm_p = 1e-6
+    # Distance of a run's mean from the others', in units of the noise, below which it is not worth a word.
+    smallest_share_of_noise = 0.5
+    if p_value > alarm_p or np.ptp(list(means.values())) < 2 * smallest_share_of_noise * noise:
         return None
     return DifferingMeans(means, p_value)
 
@@ -192,7 +191,8 @@ def compared(runs: Sequence[str], parts: Sequence[np.ndarray], rate_hz: float) -
     Of three runs and more each may be left out (the p-value counts every trial): in the run in which something changed
     the blocks differ too, and would pass for a noise that walks.
     """
-    size = max(2, int(_BLOCK_S * rate_hz))
+    block_s = 2.0
+    size = max(2, int(block_s * rate_hz))
     blocks: dict[str, list[np.ndarray]] = {}
     for run, part in zip(runs, parts, strict=True):
         count = len(part) // size

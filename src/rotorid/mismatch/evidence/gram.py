@@ -32,8 +32,6 @@ from rotorid.mismatch.evidence.regression import NEVER_EXCITED, Regression, maki
 from rotorid.mismatch.evidence.rows import Term
 
 TINY = 1e-300
-_FEWEST_ROWS = 50.0
-"""Rows that a flight is taken to have at least."""
 FULL_RIDGE = 1e-6
 """Ridge of the model of all columns, in units of their length."""
 VARIANCES = np.concatenate([[0.0], np.geomspace(1e-1, 1e11, 49)])
@@ -203,10 +201,6 @@ class _ChannelSpectrum:
     """(E, k) cross products along them."""
 
 
-_MOST_REMEMBERED = 64
-"""Variances of the leftover of which a spectrum remembers the sums: they are of a few (VARIANCES)."""
-
-
 @dataclass(frozen=True)
 class Spectrum:
     """The evidence of a flight in the eigenvectors of each channel's and environment's Gram matrix."""
@@ -225,7 +219,9 @@ class Spectrum:
         """Sums over channels with a leftover of `variance` (C,) taken out; remembered, not to be written to."""
         asked = np.asarray(variance, float).tobytes()
         if asked not in self._weighed:
-            making_room(self._weighed, _MOST_REMEMBERED)[asked] = self._sums(variance)
+            # Variances of the leftover of which a spectrum remembers the sums: they are of a few (VARIANCES).
+            most_remembered = 64
+            making_room(self._weighed, most_remembered)[asked] = self._sums(variance)
         return self._weighed[asked]
 
     def _sums(self, variance: np.ndarray) -> Weighed:
@@ -295,4 +291,5 @@ def spectrum_of(evidence: Evidence, unit: np.ndarray | None = None) -> Spectrum:
     total = evidence.cross.sum(axis=(0, 1)) * unit
     left = evidence.square.sum() - total @ np.linalg.solve(gram + FULL_RIDGE * np.eye(len(unit)), total)
     bias = evidence.bias_gram * np.outer(unit, unit)
-    return Spectrum(unit, tuple(channels), bias, max(float(left), _FEWEST_ROWS))
+    fewest_rows = 50.0  # Rows that a flight is taken to have at least.
+    return Spectrum(unit, tuple(channels), bias, max(float(left), fewest_rows))

@@ -37,43 +37,16 @@ from rotorid.vehicle.mixer import wrench_matrix
 
 PIECE_S = 3.0
 """Length of the pieces that spectra are averaged over; shorter where a stretch is."""
-_LEAST_PIECE_S = 1.5
 LIFT_TOP_HZ = 4.0
 """Above it other things than the rotors act along their axis: noise, vibration, bending."""
 _EDGES_HZ = (0.25, 0.5, 0.8, 1.2, 1.8, 2.7, 4.0, 6.0, 9.0, 13.0)
 """Edges of the bands in which responses are averaged."""
-_COMMANDS_PER_PERIOD = 4.0
-"""Commands a period of the highest frequency that is compared: of fewer nobody recorded what happened between."""
-COHERENT = 0.6
-"""Squared coherence below which a band says nothing."""
-_LEAST_BANDS = 3
-"""Bands in a row that a lag and a delay must explain: gain and phase of two may be anything's."""
 _TOLERANCE = 0.08
 """Relative error that a response may have besides its scatter: what flies is no lag of first order exactly."""
-_MOST_OFF = 2.5
-"""Standard errors by which a band may be off."""
-_GAIN = 1.6
-"""Factor by which the gain of roll and pitch may differ from the believed one: inertias are seldom known better."""
-_MOMENTS_FROM_HZ = 1.8
-"""Below, moments of the air and turns of the pilot are what moves the commands of roll and pitch."""
-_FREEDOM = 0.6
-"""Independent values a bin of half-overlapping pieces."""
-_LEAST_LEFT = 1e-3
-"""Share of the spectrum of the lift that no model is better than."""
 _PLAINER = 9.0
 """Whitened squares by which one form must be better than another that is plainer."""
-_LIKELIER = 1.0
-"""Whitened squares by which a loop's answer must explain a response better than a lag or a delay to be the likelier:
-of rotors recorded late it explains moments 10 to 49 worse, lift 0.3 better to 12 worse; of answers 3 to 13 better."""
-_WIDEST_VOLTAGE = 0.8
-"""The same of the voltage's exponent, absolute."""
 _SQUARE, _SLIGHT = 2.0, 0.04
 """Elasticity of a speed proportional to the command, and a difference from it that nobody notices."""
-_WIDEST_LAG = 0.6
-"""The same of a lateness."""
-_LATEST = 2.0
-"""The largest lateness in units of √(arm/g), in which a vehicle without power tips over: no controller holds one level
-whose rotors are later, and what is so late is a logger or a disturbance."""
 LIFT_SILENT = (
     "what moves the commands of this recording is mostly what the controller answers: fly brisk climbs and descents"
 )
@@ -81,19 +54,11 @@ LAG_SILENT = (
     "in no band of lift, roll or pitch the vehicle follows its commands without the commands following the vehicle: "
     "excite collective and attitude up to 8 Hz"
 )
-_SURELY_LATE = 3.0
-"""Standard errors by which rotors must be late to be called so."""
 ELASTICITY = (0.6, 4.0)
 """Elasticities of thrust over command that a speed controller, a motor and a propeller can have."""
-_SLOWEST_S, _LONGEST_DELAY_S = 0.2, 0.06
 _FEIGNED = 0.25
 """One-sigma of what the loop feigns, as a share of the most that coherence allows: elasticities of real flights with
 a coherence of 0.95 come out 5 to 7 % too small, which is 0.2 to 0.3 of it."""
-_WIDEST = 0.35
-"""Relative 95 % half-width of an elasticity beyond which the recording does not say it."""
-_ROUNDS = 6
-_THIN_HZ = 50.0
-"""Rate that what is compared is thinned to, at least."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +158,9 @@ class _Problem:
             self.voltage_reference_v = float(np.mean(np.concatenate(voltages)))
         self.flown, self.piece_s = [], PIECE_S
         longest = max(len(s.command) * s.dt_s for s in segments)
-        self.piece_s = float(np.clip(longest / 1.5, _LEAST_PIECE_S, PIECE_S))
+        least_piece_s = 1.5
+        self.piece_s = float(np.clip(longest / 1.5, least_piece_s, PIECE_S))
+        thin_hz = 50.0  # Rate that what is compared is thinned to, at least.
         for s in segments:
             if len(s.command) * s.dt_s < self.piece_s:
                 continue
@@ -202,7 +169,7 @@ class _Problem:
                 rate, turning = s.motion.angular_velocity, s.motion.angular_acceleration
                 moment = turning @ inertia + np.cross(rate, rate @ inertia)
                 felt += [moment[:, 0] / (weight * arm_m), moment[:, 1] / (weight * arm_m)]
-            every = max(1, int(s.rate_hz / _THIN_HZ))
+            every = max(1, int(s.rate_hz / thin_hz))
             ratio = None
             if self.voltage_reference_v is not None:
                 ratio = np.maximum(s.motion.voltage, 1e-3) / self.voltage_reference_v
@@ -279,6 +246,7 @@ def causal_bands(
     None without one. `gain` bounds the gain, `reach_hz` the frequencies compared.
     """
     bands = []
+    freedom = 0.6  # Independent values a bin of half-overlapping pieces.
     for start, stop in zip(_EDGES_HZ, _EDGES_HZ[1:], strict=False):
         inside = (frequencies_hz >= start) & (frequencies_hz < stop)
         if not inside.any() or start < reach_hz[0] or stop > reach_hz[1] * 1.01:
@@ -287,11 +255,13 @@ def causal_bands(
         cross, xx, yy = (np.conj(x) * y).sum(), (np.abs(x) ** 2).sum(), (np.abs(y) ** 2).sum()
         middle = float((frequencies_hz[inside] * (np.abs(x) ** 2).sum(axis=0)).sum() / max(xx, 1e-300))
         coherence = float(np.abs(cross) ** 2 / max(xx * yy, 1e-300))
-        bands.append((middle, cross / max(xx, 1e-300), coherence, max(1.0, _FREEDOM * x.size)))
-    ranges = [(i, j) for i in range(len(bands)) for j in range(i + _LEAST_BANDS, len(bands) + 1)]
+        bands.append((middle, cross / max(xx, 1e-300), coherence, max(1.0, freedom * x.size)))
+    least_bands = 3  # Bands in a row that a lag and a delay must explain: gain and phase of two may be anything's.
+    ranges = [(i, j) for i in range(len(bands)) for j in range(i + least_bands, len(bands) + 1)]
+    coherent = 0.6  # Squared coherence below which a band says nothing.
     for first, last in sorted(ranges, key=lambda r: (r[0] - r[1], r[0])):
         own = bands[first:last]
-        if min(b[2] for b in own) >= COHERENT and (found := _explained(own, gain)) is not None:
+        if min(b[2] for b in own) >= coherent and (found := _explained(own, gain)) is not None:
             return found
     return None
 
@@ -325,16 +295,22 @@ def _explained(bands: Sequence[tuple], gain: tuple[float, float]) -> Bands | Non
         fits = (least_squares(left, t, bounds=bounds, x_scale=[start, 0.02, 0.01]) for t in tries)
         return min(fits, key=lambda s: s.cost)
 
-    both = best(_SLOWEST_S, _LONGEST_DELAY_S)
-    if np.abs(left(both.x)).max() > _MOST_OFF or both.x[1] > 0.99 * _SLOWEST_S:
+    slowest_s, longest_delay_s = 0.2, 0.06
+    both = best(slowest_s, longest_delay_s)
+    most_off = 2.5  # Standard errors by which a band may be off.
+    if np.abs(left(both.x)).max() > most_off or both.x[1] > 0.99 * slowest_s:
         return None
     if not gain[0] < both.x[0] < gain[1]:
         return None
-    alone = 2 * best(_SLOWEST_S, 0.0).cost, 2 * best(0.0, _SLOWEST_S).cost
+    alone = 2 * best(slowest_s, 0.0).cost, 2 * best(0.0, slowest_s).cost
     ends = ([1e-3 * start, 0.0], [1e3 * start, np.inf])
-    tries = [(start, share * _SLOWEST_S) for share in (0.05, 0.25, 0.6)]
+    tries = [(start, share * slowest_s) for share in (0.05, 0.25, 0.6)]
     of_loop = 2 * min(least_squares(answered, t, bounds=ends, x_scale=[start, 0.02]).cost for t in tries)
-    if of_loop < min(alone) - _LIKELIER:
+    # Whitened squares by which a loop's answer must explain a response better than a lag or a delay to be the likelier:
+    # of rotors recorded late it explains moments 10 to 49 worse, lift 0.3 better to 12 worse; of answers 3 to 13
+    # better.
+    likelier = 1.0
+    if of_loop < min(alone) - likelier:
         return None
     return Bands(float(f_hz[0]), float(f_hz[-1]), *map(float, both.x), float(coherence.mean()), alone)
 
@@ -382,7 +358,9 @@ def _fit(problem: _Problem, law: Callable, free: Sequence[int], start: Sequence[
         return np.concatenate([rows.real, rows.imag])
 
     sd = np.zeros(3)
-    for _ in range(_ROUNDS if learn else 1):
+    least_left = 1e-3  # Share of the spectrum of the lift that no model is better than.
+    rounds = 6
+    for _ in range(rounds if learn else 1):
         found = least_squares(
             squares,
             np.clip(values[free], low[free] + 1e-6, high[free] - 1e-6),
@@ -399,7 +377,7 @@ def _fit(problem: _Problem, law: Callable, free: Sequence[int], start: Sequence[
         rest, scale = left(values)
         cost = float((weights**2 * np.abs(rest) ** 2).sum())
         if learn:
-            least = _LEAST_LEFT * np.sqrt((np.abs(felt[:, 1:]) ** 2).mean())
+            least = least_left * np.sqrt((np.abs(felt[:, 1:]) ** 2).mean())
             weights = 1.0 / np.hypot(np.sqrt((np.abs(rest) ** 2).mean(axis=0)), least + 1e-12)
     return _Fit(values, sd, cost, scale), weights
 
@@ -413,17 +391,23 @@ def read_path(segments: Sequence[Segment], vehicle: Vehicle, command_rate_hz: fl
     if problem.felt is None or not len(problem.felt):
         reason = f"no stretch of {problem.piece_s:.1f} s with commands"
         return LiftPath(problem.reference, None, reasons=dict.fromkeys((CURVE, SUPPLY, LAG, DELAY), reason))
-    f_hz, top_hz = problem.frequencies_hz, command_rate_hz / _COMMANDS_PER_PERIOD
+    # Commands a period of the highest frequency that is compared: of fewer nobody recorded what happened between.
+    commands_per_period = 4.0
+    f_hz, top_hz = problem.frequencies_hz, command_rate_hz / commands_per_period
     made = problem.made(_power, (2.0, 0.0), 0.0, False)[0]
     mean, wanted = made[:, 0, 0].real, problem.felt[:, 0, 0].real
     scale = float(mean @ wanted / (mean @ mean))
     bands = {}
+    # Factor by which the gain of roll and pitch may differ from the believed one: inertias are seldom known better.
+    gain = 1.6
+    # Below, moments of the air and turns of the pilot are what moves the commands of roll and pitch.
+    moments_from_hz = 1.8
     for c, name in enumerate(problem.channels):
         if c == 0:
             limits, reach = (ELASTICITY[0] / 2, ELASTICITY[1] / 2), (0.0, min(top_hz, LIFT_TOP_HZ))
         else:
             around = bands["lift"].gain if "lift" in bands else 1.0
-            limits, reach = (around / _GAIN, around * _GAIN), (_MOMENTS_FROM_HZ, top_hz)
+            limits, reach = (around / gain, around * gain), (moments_from_hz, top_hz)
         found = causal_bands(f_hz, scale * made[:, :, c], problem.felt[:, :, c], limits, reach)
         if found is not None:
             bands[name] = found
@@ -441,16 +425,22 @@ def read_path(segments: Sequence[Segment], vehicle: Vehicle, command_rate_hz: fl
         shape, fit = ("line", line) if line.cost < power.cost - _PLAINER else ("power", power)
         sd = _doubted(problem, bands["lift"], SHAPES[shape], free, fit, weights)
         late.append((fit.values[2], sd[2]))
-        if 1.96 * sd[0] <= _WIDEST * fit.values[0] and ELASTICITY[0] <= fit.values[0] <= ELASTICITY[1]:
+        widest = 0.35  # Relative 95 % half-width of an elasticity beyond which the recording does not say it.
+        if 1.96 * sd[0] <= widest * fit.values[0] and ELASTICITY[0] <= fit.values[0] <= ELASTICITY[1]:
             elasticity = fit.values[0], sd[0]
             scale = fit.scale
-        if elasticity is not None and knows and 1.96 * sd[1] <= _WIDEST_VOLTAGE:
+        widest_voltage = 0.8  # 95 % half-width of the voltage's exponent beyond which it is not said.
+        if elasticity is not None and knows and 1.96 * sd[1] <= widest_voltage:
             voltage = fit.values[1], sd[1]
     reasons |= {key: LIFT_SILENT for key, own in ((CURVE, elasticity), (SUPPLY, voltage)) if own is None}
     lag = _together(late) if late else None
     arm_m = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).max())
-    latest_s = _LATEST * np.sqrt(arm_m / vehicle.gravity_m_s2) if arm_m > 0 else np.inf
-    if lag is None or lag[0] > latest_s or 1.96 * lag[1] > _WIDEST_LAG * lag[0] + 0.5 / command_rate_hz:
+    # The largest lateness in units of √(arm/g), in which a vehicle without power tips over: no controller holds one
+    # level whose rotors are later, and what is so late is a logger or a disturbance.
+    latest = 2.0
+    latest_s = latest * np.sqrt(arm_m / vehicle.gravity_m_s2) if arm_m > 0 else np.inf
+    widest_lag = 0.6  # Relative 95 % half-width of a lateness beyond which it is not said.
+    if lag is None or lag[0] > latest_s or 1.96 * lag[1] > widest_lag * lag[0] + 0.5 / command_rate_hz:
         lag, words = None, LAG_SILENT if top_hz >= LIFT_TOP_HZ else _slow_commands(command_rate_hz)
         reasons |= dict.fromkeys((LAG, DELAY), words)
     return LiftPath(
@@ -536,8 +526,9 @@ def chain_of_lift(
     if found.sags:
         supply = _of_stage(SUPPLY)
         add(supply, supply.about(found.voltage_reference_v / full_voltage), found.voltage)
+    surely_late = 3.0  # Standard errors by which rotors must be late to be called so.
     # Between two commands nobody recorded what happened.
-    if found.lag_s is not None and found.lag_s[0] > max(_SURELY_LATE * found.lag_s[1], 0.5 / command_rate_hz):
+    if found.lag_s is not None and found.lag_s[0] > max(surely_late * found.lag_s[1], 0.5 / command_rate_hz):
         late = _of_stage(found.late_by)
         add(late, late.speed_forms[0], found.lag_s)
         if found.one_of_two:

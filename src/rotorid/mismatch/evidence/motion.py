@@ -33,27 +33,11 @@ from rotorid.recordings.signal import kernels
 
 SLOW_S = 5.0
 """Length of the mean that is taken for slow."""
-_MEMORY_S, _MOST_MEMORY = 1.0, 0.2
-"""Noise has forgotten itself after so long: means over it hold less than this share of its power."""
-_RELAXATION_S = (0.0, 0.03, 0.1, 0.3, 1.0)
-"""Time constants with which the voltage may follow the load."""
-_SLOW_HZ = 1.0
-"""Below it the height is the sensor's, above it the climb integrated: half the power passes."""
-_SLOW_ALONE_HZ = 3.0
-"""The same where no climb is known; no vehicle near the ground changes its height faster."""
-_WINDOW = 128
-"""Samples of a window of the spectra."""
-_HIGHEST = 0.48
-"""Highest frequency compared, as a share of the rate."""
-_LEAST_COMMON = 0.15
-"""Coherence from which the two have a source in common: simulated autopilots have 0.2 to 1, independent sensors up to
-0.03, which is what chance alone makes of forty windows."""
 SensorNoise = dict[str, np.ndarray]
 """One-sigma per sample of white noise of each column of a sensor, (columns,), by the sensor's key."""
 LONGEST_BRIDGED_SAMPLES = 6
 """A hole of up to this many of a column's own periods is interpolated; a longer one splits the run or stays a hole."""
 SHORTEST_SEGMENT_S = 2.0
-_EVEN_SHARE = 0.85
 
 
 @dataclass(frozen=True)
@@ -102,13 +86,6 @@ class Segment:
         )
 
 
-_SELDOM_HZ = 5.0
-"""Rate below which readings of rotors limit the band: of what a vehicle does within a second they hold nothing, while
-a curve through ten readings a second follows motions of one and a half hertz."""
-_WIDEST_SLOPE = 0.4
-"""Highest cutoff of a derivative, as a share of the rate: at 0.45 its gain below 4 Hz is 1.5 to 3 % too large."""
-
-
 def own_rate_hz(time_s: np.ndarray, values: np.ndarray) -> float:
     """Rate at which a column (or columns, (n, m)) truly changes: missing and held samples do not count."""
     fresh = fresh_samples(values)
@@ -140,11 +117,12 @@ def fresh_samples(values: np.ndarray) -> np.ndarray:
 def _evenly_spaced(index: np.ndarray) -> bool:
     """Whether the gaps between rising indices are nearly all one length, give or take a sample.
 
-    Where each sample repeats by chance with a probability above 0.4, fewer than EVEN_SHARE of the (geometrically
+    Where each sample repeats by chance with a probability above 0.4, fewer than `even_share` of the (geometrically
     distributed) gaps lie within one sample of their median.
     """
     gaps = np.diff(index)
-    return bool(np.mean(np.abs(gaps - np.median(gaps)) <= 1) >= _EVEN_SHARE)
+    even_share = 0.85
+    return bool(np.mean(np.abs(gaps - np.median(gaps)) <= 1) >= even_share)
 
 
 def _resample(time_s, values, grid_s, smooth):
@@ -211,6 +189,9 @@ HIGHEST_CUTOFF_HZ = 20.0
 def analysis_rate_hz(runs: tuple[Run, ...], vehicle: Vehicle, highest_cutoff_hz: float) -> tuple[float, float]:
     """Rate of the common grid and cutoff of the analysis, Hz, for all runs of a set."""
     rates, cutoffs = [], []
+    # Rate below which readings of rotors limit the band: of what a vehicle does within a second they hold nothing,
+    # while a curve through ten readings a second follows motions of one and a half hertz.
+    seldom_hz = 5.0
     for run in runs:
         t = run.time_s
         base = 1.0 / float(np.median(np.diff(t)))
@@ -226,7 +207,7 @@ def analysis_rate_hz(runs: tuple[Run, ...], vehicle: Vehicle, highest_cutoff_hz:
         for names in inertial:
             if run.has(*names):
                 joined_hz = run.joined_hz.get(names[0], np.inf)
-                own.append(min(own_rate_hz(t, run.array(names)), joined_hz if joined_hz < _SELDOM_HZ else np.inf))
+                own.append(min(own_rate_hz(t, run.array(names)), joined_hz if joined_hz < seldom_hz else np.inf))
         rates.append(base)
         cutoffs.append(0.4 * min([r for r in own if r > 0], default=base))
     return float(np.median(rates)), float(min(highest_cutoff_hz, *cutoffs))
@@ -291,7 +272,9 @@ def build_segments(
         good &= np.isfinite(height).all(axis=1)
 
     segments = []
-    inner = min(_WIDEST_SLOPE * rate_hz, 1.6 * cutoff_hz)
+    # Highest cutoff of a derivative, as a share of the rate: at 0.45 its gain below 4 Hz is 1.5 to 3 % too large.
+    widest_slope = 0.4
+    inner = min(widest_slope * rate_hz, 1.6 * cutoff_hz)
     margin = kernels.half_length(rate_hz, inner)
     slope = kernels.derivative(rate_hz, inner)
     for start, stop in stretches(good):
@@ -414,28 +397,33 @@ def estimated_full_speed(vehicle: Vehicle, throttle: np.ndarray) -> float:
 
 def made_from_accelerometer(segments: Iterable[Segment], cutoff_hz: float) -> bool:
     """Whether velocity and accelerometer of these stretches share what is above `cutoff_hz`."""
-    cross = np.zeros((3, _WINDOW // 2 + 1), complex)
+    window = 128  # Samples of a window of the spectra.
+    cross = np.zeros((3, window // 2 + 1), complex)
     read, moved = np.zeros(cross.shape), np.zeros(cross.shape)
     band = np.zeros(cross.shape[1], bool)
+    highest = 0.48  # Highest frequency compared, as a share of the rate.
     for s in segments:
         motion = s.motion
         both = motion.accelerometer is not None and motion.velocity is not None and motion.rotation is not None
-        if not both or motion.size <= _WINDOW:
+        if not both or motion.size <= window:
             continue
         velocity, force = (
             np.einsum("nij,nj->in", motion.rotation, own) for own in (motion.velocity, motion.accelerometer)
         )
         change, between = np.diff(velocity) * s.rate_hz, 0.5 * (force[:, 1:] + force[:, :-1])
-        how = {"fs": s.rate_hz, "nperseg": _WINDOW, "axis": 1}
+        how = {"fs": s.rate_hz, "nperseg": window, "axis": 1}
         f_hz, own = csd(between, change, **how)
-        band |= (f_hz > cutoff_hz) & (f_hz < _HIGHEST * s.rate_hz)
+        band |= (f_hz > cutoff_hz) & (f_hz < highest * s.rate_hz)
         cross += motion.size * own
         read += motion.size * welch(between, **how)[1]
         moved += motion.size * welch(change, **how)[1]
     if not band.any():
         return False
     coherence = np.abs(cross) ** 2 / np.maximum(read * moved, 1e-300)
-    return bool(coherence[:, band].mean() > _LEAST_COMMON)
+    # Coherence from which the two have a source in common: simulated autopilots have 0.2 to 1, independent sensors up
+    # to 0.03, which is what chance alone makes of forty windows.
+    least_common = 0.15
+    return bool(coherence[:, band].mean() > least_common)
 
 
 def quiet_height(height_m: np.ndarray, climb_m_s: np.ndarray | None, dt_s: float) -> np.ndarray:
@@ -447,9 +435,12 @@ def quiet_height(height_m: np.ndarray, climb_m_s: np.ndarray | None, dt_s: float
     known = np.isfinite(height_m)
     if known.sum() < 2:
         return height_m
-    cutoff_hz, climbed = _SLOW_ALONE_HZ, np.zeros(len(height_m))
+    # Below it the height is the sensor's, above it the climb integrated (half the power passes); and the same where no
+    # climb is known: no vehicle near the ground changes its height faster.
+    slow_hz, slow_alone_hz = 1.0, 3.0
+    cutoff_hz, climbed = slow_alone_hz, np.zeros(len(height_m))
     if climb_m_s is not None and np.isfinite(climb_m_s).all():
-        cutoff_hz = _SLOW_HZ
+        cutoff_hz = slow_hz
         climbed[1:] = np.cumsum((climb_m_s[1:] + climb_m_s[:-1]) / 2 * dt_s)
     index = np.arange(len(height_m))
     rest = np.interp(index, index[known], (height_m - climbed)[known])
@@ -514,22 +505,25 @@ def expected_voltages(voltages: list[np.ndarray], commands: list[np.ndarray], st
 
 
 def is_noise(rests: list[np.ndarray], steps_s: list[float]) -> bool:
-    """Whether what was taken off voltages (n,) is a voltmeter's noise: means over MEMORY_S of it are near nothing.
+    """Whether what was taken off voltages (n,) is a voltmeter's noise: means over `memory_s` of it are near nothing.
 
     A supply that is switched over in steps is neither slow nor does it follow the load; it stays as it was read.
     """
     power, kept = 0.0, 0.0
+    # Noise has forgotten itself after so long: means over it hold less than this share of its power.
+    memory_s, most_memory = 1.0, 0.2
     for rest, dt_s in zip(rests, steps_s, strict=True):
-        size = max(int(_MEMORY_S / dt_s), 1)
+        size = max(int(memory_s / dt_s), 1)
         count = len(rest) // size
         power += float(rest[: count * size] @ rest[: count * size]) / size
         kept += float(np.sum(rest[: count * size].reshape(count, size).mean(axis=1) ** 2))
-    return kept < _MOST_MEMORY * power
+    return kept < most_memory * power
 
 
 def _relaxed(load: np.ndarray, dt_s: float) -> np.ndarray:
     """A load (n,) through first-order lags of every time constant, settled at the start, (n, 5)."""
-    keeps = [np.exp(-dt_s / tau) if tau > 0 else 0.0 for tau in _RELAXATION_S]
+    relaxation_s = (0.0, 0.03, 0.1, 0.3, 1.0)  # Time constants with which the voltage may follow the load.
+    keeps = [np.exp(-dt_s / tau) if tau > 0 else 0.0 for tau in relaxation_s]
     return np.stack([lfilter([1 - k], [1, -k], load, zi=[k * load[0]])[0] for k in keeps], axis=1)
 
 

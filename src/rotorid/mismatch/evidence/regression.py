@@ -24,7 +24,7 @@ is in the residual with the other sign, noise of the measured side with its own.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -39,20 +39,10 @@ from rotorid.mismatch.evidence.rows import Rows, Term, Thinner, baseline_wrench,
 from rotorid.recordings import Vehicle
 from rotorid.recordings.signal.kernels import causal
 
+Within = Callable[[str, float], bool | None]
+"""Of a run and an instant of it, s, whether they are fitted, held out (False) or in a gap (None)."""
 NOISE_BAND = (0.5, 0.85)
 """Band, as shares of the cutoff, in which noise is distinguished from motion."""
-_MOSTLY_NOISE = 0.3
-"""Share of a side's power in the band that must be noise before it says how much noise there is."""
-_SHORTEST_ROWS = 32
-_LEAST_FACTOR, _MOST_FACTOR = 1.2, 10.0
-"""A sensor with more noise than that was filtered before it was recorded: what is left in the band may be the model's
-own."""
-_MOST_ALIKE = 1e6
-"""Largest element of the inverse of scaled equations (1 / (1 - R²) of a column) of which rounding leaves enough."""
-_HIGHEST_AR_ORDER = 12
-_WHITE_SHARE = 0.01
-"""White part assumed in every residual, as a share of its variance: recordings smoothed before they were stored
-have almost no energy at high frequency, and whitening must not make that corner decide."""
 AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
 """Two instruments that agree to within this (m/s2, rad/s; one sigma) are called equal."""
 MOST_ATTENUATION = 0.3
@@ -60,8 +50,6 @@ MOST_ATTENUATION = 0.3
 DOUBT_OF_CORRECTION = 0.5
 _MOST_REMEMBERED = 2000
 """Fits that a regression remembers."""
-_MOST_LEFT_OUT = 200
-"""Models of which a regression remembers the fits without each fold."""
 _MOST_EXPLAINED = 100_000
 """Models of which a regression remembers what they explain."""
 _MOST_DISTRUST = 3.0
@@ -74,8 +62,6 @@ _RIDGE = 1e-10
 """Trace of ridge on every normal matrix, in units of its diagonal."""
 NEVER_EXCITED = 1e-24
 """Diagonal of a normal matrix up to which a column is not excited at all."""
-_UNKNOWN = 1e12
-"""Variance of a coefficient of which nothing is known."""
 
 
 def _autocovariance(parts: list[np.ndarray], order: int) -> np.ndarray:
@@ -92,11 +78,15 @@ def autoregression(parts: list[np.ndarray], floor: float = 0.0) -> np.ndarray:
     `floor` is the one-sigma of white noise assumed on top.
     """
     total = sum(len(p) for p in parts)
-    highest = int(min(_HIGHEST_AR_ORDER, max(1, total // 50)))
+    highest_ar_order = 12
+    highest = int(min(highest_ar_order, max(1, total // 50)))
     covariance = _autocovariance(parts, highest)
     if covariance[0] <= 0:
         return np.array([1.0])
-    covariance[0] += _WHITE_SHARE * covariance[0] + floor**2
+    # White part assumed in every residual, as a share of its variance: recordings smoothed before they were stored have
+    # almost no energy at high frequency, and whitening must not make that corner decide.
+    white_share = 0.01
+    covariance[0] += white_share * covariance[0] + floor**2
     best = (np.inf, np.array([1.0 / np.sqrt(covariance[0])]))
     for order in range(0, highest + 1):
         a = solve_toeplitz(covariance[:order], covariance[1 : order + 1]) if order else np.zeros(0)
@@ -158,10 +148,6 @@ class _Apart:
     def before(self, kept: int) -> _Apart:
         """The same without the columns from `kept` on."""
         return replace(self, gram=self.gram[:, :, :kept], bias_gram=self.bias_gram[:, :kept])
-
-
-_MOST_ENVIRONMENTS = 120
-"""Environments of which products are kept channel by channel; those of a longer flight are joined."""
 
 
 @dataclass(frozen=True)
@@ -255,6 +241,8 @@ class Regression:
     """Blocks over which the noise of neighbours may still be alike (1/f noise of a sensor at rest)."""
     block_s: float = 1.0
     """Length of a block, s."""
+    rate_hz: float = 1.0
+    """Rate of the rows."""
     blocks_of_rows: tuple[np.ndarray, ...] = ()
     """Of every stretch the block that each of its rows is in, (n,); -1 where it is in none."""
     apart: _Apart | None = None
@@ -289,6 +277,15 @@ class Regression:
         self._solutions: dict[int, Solution] = {}
         self._fits: dict[tuple, Fit] = {}
         self._left_out: dict[tuple, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+
+    def again(
+        self, rows: list[Rows], terms: Sequence[Term], noisy: list[Rows] | None = None, within: Within | None = None
+    ) -> Regression:
+        """The regression of other rows and terms with these whitening filters and blocks, by channel, too.
+
+        `noisy` and `within` as in `build`.
+        """
+        return build(rows, list(terms), self.filters, within, self.block_s, self.rate_hz, noisy, by_channel=True)
 
     def with_room(self, least: float) -> Regression:
         """The same with believed values that may move by at least a share `least`."""
@@ -632,7 +629,8 @@ class Regression:
         """As `left_out`, with the covariance of the coefficients for white noise, (folds, k, k)."""
         asked = tuple(keys), whole_runs, tuple(sorted((loose or {}).items()))
         if asked not in self._left_out:
-            making_room(self._left_out, _MOST_LEFT_OUT)[asked] = self._leave_out(*asked)
+            most_left_out = 200  # Models of which a regression remembers the fits without each fold.
+            making_room(self._left_out, most_left_out)[asked] = self._leave_out(*asked)
         return self._left_out[asked]
 
     def _leave_out(self, keys, whole_runs, loose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -647,6 +645,7 @@ class Regression:
             for key, sd in loose:
                 precision[self.columns([key])] = 1.0 / sd**2
         found, inverses = [], []
+        unknown = 1e12  # Variance of a coefficient of which nothing is known.
         for out in range(fold.max() + 1):
             gram, cross, bias, bias_cross = self._equations(self.normal(cols, parts[out]), cols, parts[out])
             normal = _raised(gram - bias, precision[cols])
@@ -654,7 +653,7 @@ class Regression:
             found.append(beta)
             # Of a column that only this fold excites nothing is known without it.
             dead = np.diag(normal) <= NEVER_EXCITED
-            inverses.append(np.where(np.diag(dead), _UNKNOWN, inverse))
+            inverses.append(np.where(np.diag(dead), unknown, inverse))
             self._fit_held_out_scales(cols, found[-1], fold == out)
         return cols, np.array(found), np.array(inverses)
 
@@ -1005,7 +1004,7 @@ def build(
     rows: list[Rows],
     terms: list[Term],
     filters: dict[int, np.ndarray],
-    in_training,
+    within: Within | None,
     block_s: float,
     rate_hz: float,
     noisy: list[Rows] | None = None,
@@ -1015,7 +1014,8 @@ def build(
 ) -> Regression:
     """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more.
 
-    `in_training(run, time_s)` says True for a block to fit, False for one held out, None for a gap. The channels
+    `within` of a block's run and middle, s, is True for one to fit, False for one held out, None for a gap; without it
+    all are fitted. The channels
     `estimated_by` alone estimate the terms `apart` (`_Apart`). `by_channel` keeps the products channel by channel, too.
     """
     start, at = {}, 0
@@ -1026,7 +1026,7 @@ def build(
     longest = max(len(f) for f in filters.values()) - 1
     own = np.sort([start[t.key] + i for t in terms if t.key in set(apart) for i in range(t.size)]).astype(int)
     names = {name: i for i, name in enumerate(dict.fromkeys(r.run for r in rows))}
-    parts_of, blocks_of_rows, runs, training = _blocks_of(rows, names, per_block, longest, in_training)
+    parts_of, blocks_of_rows, runs, training = _blocks_of(rows, names, per_block, longest, within)
     count = len(runs)
     fitted = np.array([t is True for t in training])
     gram, cross, square = np.zeros((at, at, count)), np.zeros((count, at)), np.zeros(count)
@@ -1088,6 +1088,7 @@ def build(
         filters,
         names,
         block_s=per_block / rate_hz,
+        rate_hz=rate_hz,
         blocks_of_rows=tuple(blocks_of_rows),
         apart=_Apart(own, own_gram, own_cross, own_bias, own_bias_cross, np.array(sorted(estimated_by), int))
         if len(own)
@@ -1097,7 +1098,7 @@ def build(
 
 
 def _blocks_of(
-    rows: list[Rows], names: dict[str, int], per_block: int, longest: int, in_training
+    rows: list[Rows], names: dict[str, int], per_block: int, longest: int, within: Within | None
 ) -> tuple[list[list[slice]], list[np.ndarray], list[int], list[bool | None]]:
     """Of every stretch its blocks as places behind the whitening's reach `longest`, and of each of its rows the block;
     of every block the run's number, and whether it is fitted."""
@@ -1117,7 +1118,7 @@ def _blocks_of(
         middles = [
             r.time_s[min(len(r.time_s) - 1, longest + (part.start + part.stop - 1) // 2)] for part in parts_of[-1]
         ]
-        training += [in_training(r.run, float(middle)) for middle in middles]
+        training += [within is None or within(r.run, float(middle)) for middle in middles]
     return parts_of, blocks_of_rows, runs, training
 
 
@@ -1128,7 +1129,9 @@ def _empty_by_channel(
     environment = np.full(len(runs), -1)
     environment[fitted] = environments(np.array(runs)[fitted], block_s)
     count = int(environment.max(initial=0)) + 1
-    environment //= -(-count // _MOST_ENVIRONMENTS)  # joined where they are more than that
+    # Environments of which products are kept channel by channel; those of a longer flight are joined.
+    most_environments = 120
+    environment //= -(-count // most_environments)  # joined where they are more than that
     count = int(environment.max(initial=0)) + 1
     return _ByChannel(
         channels=channels,
@@ -1195,7 +1198,9 @@ class _Equations:
         towards = others @ self.gram[base[:, None], base] + 2 * (beta[:, None] @ mixed)[:, 0]
         found = 2 * others @ self.cross[base] + 2 * (beta * self.cross[further]).sum(axis=1)
         found -= (towards * others).sum(axis=1) + ((self.gram[diagonal] @ beta[:, :, None])[:, :, 0] * beta).sum(axis=1)
-        alike = np.maximum(np.abs(own).max(axis=(1, 2)), np.abs(inverse).max(initial=0.0)) > _MOST_ALIKE
+        # Largest element of the inverse of scaled equations (1 / (1 - R²) of a column) of which rounding leaves enough.
+        most_alike = 1e6
+        alike = np.maximum(np.abs(own).max(axis=(1, 2)), np.abs(inverse).max(initial=0.0)) > most_alike
         return found, alike | (self._noise_share(base, further) > most_noise)
 
     def _noise_share(self, base: np.ndarray, further: np.ndarray) -> np.ndarray:
@@ -1248,6 +1253,7 @@ def noise_factors(
     if not sides:
         return {}
     rate_hz, band = thinner.rate_hz, tuple(share * thinner.cutoff_hz for share in NOISE_BAND)
+    mostly_noise = 0.3  # Share of a side's power in the band that must be noise before it says how much noise there is.
     for c in range(3):
         left = [measured[:, c] - modelled[:, c] for (measured, modelled), _ in sides]
         whole = band_power(left, rate_hz, band)
@@ -1256,12 +1262,15 @@ def noise_factors(
             added = [b[side][:, c] - a[side][:, c] for a, b in sides]
             power, assumed = band_power(own, rate_hz, band), band_power(added, rate_hz, band)
             found = min(sign * band_power(left, rate_hz, band, own), whole)
-            if assumed > 0 and found > _MOSTLY_NOISE * power:
+            if assumed > 0 and found > mostly_noise * power:
                 squares[sensor][c] = found / assumed
     ratios = {"gyroscope": squares["gyroscope"], "rotors": squares["rotors"][np.isfinite(squares["rotors"])]}
     ratios["rotors"] = np.median(ratios["rotors"], keepdims=True) if len(ratios["rotors"]) else np.ones(1)
     factors = {sensor: np.sqrt(found) for sensor, found in ratios.items()}
-    plain = {s: np.where((f > _LEAST_FACTOR) & (f < _MOST_FACTOR), f, 1.0) for s, f in factors.items()}
+    # A sensor with more noise than that was filtered before it was recorded: what is left in the band may be the
+    # model's own.
+    least_factor, most_factor = 1.2, 10.0
+    plain = {s: np.where((f > least_factor) & (f < most_factor), f, 1.0) for s, f in factors.items()}
     return {sensor: factor for sensor, factor in plain.items() if (factor > 1.0).any()}
 
 
@@ -1280,8 +1289,9 @@ def band_power(
 ) -> float:
     """Mean power density of stretches in a band of frequency, or its real cross density with `other` stretches."""
     total, weight = 0.0, 0
+    shortest_rows = 32
     for a, b in zip(one, one if other is None else other, strict=True):
-        if len(a) >= _SHORTEST_ROWS:
+        if len(a) >= shortest_rows:
             frequency, density = csd(a, b, fs=rate_hz, nperseg=min(len(a), 256))
             inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
             total, weight = total + float(density[inside].real.mean()) * len(a), weight + len(a)

@@ -36,12 +36,6 @@ from rotorid.mismatch.evidence.motion import Segment
 from rotorid.recordings import Vehicle
 from rotorid.recordings.signal import kernels
 
-_LEAST_NOISE = 0.1
-"""Share of a contribution's energy in a channel of a run that must be noise before it is filtered."""
-_PIECE_S = 4.0
-"""Length of the pieces that spectra are averaged over, and of the filter."""
-_SHORTEST = 16
-"""Rows that a stretch must have to be filtered; in a shorter one the contribution stands."""
 _COMPARISONS = range(6, 12)
 """Channels in which two sensors are compared: accelerometer and velocity, gyroscope and attitude."""
 Block = dict[str, np.ndarray]
@@ -61,10 +55,6 @@ PARAMETER_NAMES = {
 
 UNKNOWNS_OF_A_STATE = 4
 """Of what swings, where a piece of a run begins: two angles and two rates."""
-_STATE_STEP = 1e-3
-"""Of a slope by a state, rad."""
-_SUSTAINED_S = 6.0
-"""No vehicle keeps up an angular acceleration for longer: one-sigma of the mean in time that is taken away."""
 
 
 @dataclass(frozen=True)
@@ -236,12 +226,13 @@ def state_column(term: Term, segment: Segment, vehicle: Vehicle, groups) -> dict
         return {}
     rate = float(np.sqrt(vehicle.gravity_m_s2 / values[term.form.nonlinear[0]]))
     parts = []
-    for step in (_STATE_STEP, -_STATE_STEP):
+    state_step = 1e-3  # Of a slope by a state, rad.
+    for step in (state_step, -state_step):
         hung = motion.hung.copy()
         hung[pieces[0], 1:] = moved(hung[pieces[0], 1:], step * np.eye(UNKNOWNS_OF_A_STATE)[term.slope_of], rate)
         there = replace(motion, hung=hung)
         parts.append(project(term.form.contribution(there, vehicle, values), segment, vehicle, groups))
-    return {k: (parts[0][k] - parts[1][k]) / (2 * _STATE_STEP) for k in parts[0]}
+    return {k: (parts[0][k] - parts[1][k]) / (2 * state_step) for k in parts[0]}
 
 
 def measured_moment(segment: Segment, vehicle: Vehicle) -> np.ndarray:
@@ -257,7 +248,9 @@ def high_passed(angular_acceleration: np.ndarray, rate_hz: float) -> np.ndarray:
     window, which makes a fifth too much of what turns a little faster than it lasts, nor ends that are held: one wild
     instant would then last.)
     """
-    return angular_acceleration - kernels.gaussian(angular_acceleration, _SUSTAINED_S * rate_hz)
+    # No vehicle keeps up an angular acceleration for longer: one-sigma of the mean in time that is taken away.
+    sustained_s = 6.0
+    return angular_acceleration - kernels.gaussian(angular_acceleration, sustained_s * rate_hz)
 
 
 def value_columns(
@@ -343,10 +336,6 @@ class Rows:
     """Columns of all terms, (n, 12, K)."""
 
 
-_BY_BLOCKS = 4
-"""Thinning from which blocks of samples are multiplied as matrices."""
-
-
 class Thinner:
     """Low-pass and thinning, the same for everything."""
 
@@ -364,8 +353,9 @@ class Thinner:
         # upfirdn's sample j·step is the kernel's last tap at input j·step; the uncovered start is skipped.
         skip = -(-(len(self.kernel) - 1) // self.step)
         count = (len(signal) - 1) // self.step + 1 - skip
+        by_blocks = 4  # Thinning from which blocks of samples are multiplied as matrices.
         # A reading that is missing must not reach its neighbours, which share a product with it.
-        if self.step < _BY_BLOCKS or count < 1 or not np.isfinite(signal).all():
+        if self.step < by_blocks or count < 1 or not np.isfinite(signal).all():
             return upfirdn(self.kernel, signal, up=1, down=self.step, axis=0)[skip : skip + max(count, 0)]
         start, columns = skip * self.step - len(self.kernel) + 1, signal.reshape(len(signal), -1)
         return self._by_blocks(columns[start:], count).T.reshape(count, *signal.shape[1:])
@@ -478,12 +468,16 @@ class Contributions:
     def cleared(self, parts: list[np.ndarray], noise: list[np.ndarray]) -> list[np.ndarray]:
         """Contributions (n,) to one channel of one run, through Wiener's filter if much of them is noise."""
         whole, own = sum(float(p @ p) for p in parts), sum(float(n @ n) for n in noise)
-        if own <= _LEAST_NOISE * whole:
+        # Share of a contribution's energy in a channel of a run that must be noise before it is filtered.
+        least_noise = 0.1
+        if own <= least_noise * whole:
             return parts
-        long = [k for k, p in enumerate(parts) if len(p) >= _SHORTEST]
+        shortest = 16  # Rows that a stretch must have to be filtered; in a shorter one the contribution stands.
+        long = [k for k, p in enumerate(parts) if len(p) >= shortest]
         if not long:
             return parts
-        size = min(int(_PIECE_S * self.rate_hz), max(len(parts[k]) for k in long)) // 2 * 2
+        piece_s = 4.0  # Length of the pieces that spectra are averaged over, and of the filter.
+        size = min(int(piece_s * self.rate_hz), max(len(parts[k]) for k in long)) // 2 * 2
         long = [k for k in long if len(parts[k]) >= size // 2]
         power, of_noise = (_spectrum([x[k] for k in long], size) for x in (parts, noise))
         passed = np.clip(1.0 - of_noise / np.maximum(power, 1e-300), 0.0, 1.0)

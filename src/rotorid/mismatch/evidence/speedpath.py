@@ -30,24 +30,8 @@ ENTER_P = 1e-5
 """A form between command and speed enters below this."""
 COST_PER_PARAMETER = 10.0
 SMALLEST_SIZE = 0.15
-_LEAST_RESPONSE = 0.25
-"""Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
-_PLAINLY_LESS = 0.98
-"""Share of the squares that commands leave as they are first taken, which hold or are smooth, below which they are the
-other: a lag imitates either."""
 _HARDLY_FOLLOWS = "rotors would hardly follow their commands with it"
-_LIMIT_WAYS, _LIMIT_SHARES = (0.97, 0.9, 0.8, 0.65, 0.5), (0.02, 0.05, 0.1, 0.2, 0.3, 0.4)
-"""Starts of a limit: of the way from the usual command to the outermost, which may be that of a single jerk, and of the
-commands that it holds."""
-_MOST_LIMITED = 0.5
-"""Share of the time that a limit may hold a rotor."""
-_AT_BOUND = 1e-3
-"""Share of a parameter's range from its bound within which the bound holds it."""
-_LEAST_INFORMATION = 1e-30
-"""Inverse variance of a parameter that changes nothing."""
 
-_STEPS_KEPT = 3
-"""What a step of a chain made last that is kept: slopes move one parameter at a time, and a step has up to two."""
 
 Chain = tuple[tuple[str, SpeedForm], ...]
 LastSteps = dict[int, list[tuple[np.ndarray, tuple, np.ndarray]]]
@@ -169,13 +153,15 @@ def commanded_path(
     path = SpeedPath(segment.command, motion.time_s, full_speed, motion.voltage, full_voltage)
     steps = [(form.stage, form.apply, own) for _, form, own in steps_of(chain, values)]
     steps.append((DELAY, shifted if holds else moved, np.array([shift_s])))
+    # What a step of a chain made last that is kept: slopes move one parameter at a time, and a step has up to two.
+    steps_kept = 3
     for place, (_, apply, own) in enumerate(sorted(steps, key=lambda s: s[0])):
         known = [] if last is None else last.setdefault(place, [])
         asked = apply, tuple(own)
         speed = next((made for of, how, made in known if of is path.speed and how == asked), None)
         if speed is None:
             speed = apply(path, own)
-            known[:] = [(path.speed, asked, speed), *known[: _STEPS_KEPT - 1]]
+            known[:] = [(path.speed, asked, speed), *known[: steps_kept - 1]]
         path = replace(path, speed=speed)
     return path.speed
 
@@ -335,8 +321,9 @@ class PathProblem(ABC):
             gram += flat.T @ flat
             scores.append(flat.T @ left[block].ravel())
         gram += np.diag(np.append(np.zeros(own), sd**-2.0))
+        least_information = 1e-30  # Inverse variance of a parameter that changes nothing.
         # A limit that is never reached changes nothing: its variance is large, and finite.
-        gram += np.diag(np.where(np.diag(gram) < _LEAST_INFORMATION, _LEAST_INFORMATION, 0.0))
+        gram += np.diag(np.where(np.diag(gram) < least_information, least_information, 0.0))
         unit = 1.0 / np.sqrt(np.diag(gram))
         inverse = np.linalg.pinv(gram * np.outer(unit, unit), hermitian=True) * np.outer(unit, unit)
         count, scores = len(scores), np.array(scores)
@@ -428,8 +415,11 @@ class SpeedSearch:
         shares = np.concatenate([c.ravel() for c, _ in self.problem.commands]) / self.problem.full_speed
         middle = float(np.median(shares))
         outermost = float(self.neutral(form)[0])
-        held = np.array(_LIMIT_SHARES) if outermost < middle else 1.0 - np.array(_LIMIT_SHARES)
-        on_the_way = middle + np.array(_LIMIT_WAYS) * (outermost - middle)
+        # Starts of a limit: of the way from the usual command to the outermost, which may be that of a single jerk, and
+        # of the commands that it holds.
+        limit_ways, limit_shares = (0.97, 0.9, 0.8, 0.65, 0.5), (0.02, 0.05, 0.1, 0.2, 0.3, 0.4)
+        held = np.array(limit_shares) if outermost < middle else 1.0 - np.array(limit_shares)
+        on_the_way = middle + np.array(limit_ways) * (outermost - middle)
         return list(np.concatenate([on_the_way, np.quantile(shares, held)])[:, None])
 
     @step("how large the noise is")
@@ -473,7 +463,10 @@ class SpeedSearch:
         self.problem.holds = not fit.holds
         other = self.problem.fit(fit.chain, fit.values, fit)
         self.problem.holds = fit.holds
-        return other if other.cost <= _PLAINLY_LESS * fit.cost else fit
+        # Share of the squares that commands leave as they are first taken, which hold or are smooth, below which they
+        # are the other: a lag imitates either.
+        plainly_less = 0.98
+        return other if other.cost <= plainly_less * fit.cost else fit
 
     def size(self, fit: SpeedFit, key: str) -> float:
         """Change that an id makes in units of the residual's own noise, strongest tenth of the seconds.
@@ -574,13 +567,15 @@ class SpeedSearch:
         high = max(float(c.max()) for c, _ in self.problem.commands)
         grid = np.linspace(low, high, 9)[:, None]
         path = SpeedPath(grid, 0.01 * np.arange(9.0), self.problem.full_speed)
+        # Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half.
+        least_response = 0.25
         for key, form in fit.chain:
             if form.stage == LIMIT and self._always_limited(form, fit.values[fit.slice_of(key)]):
                 return False
             if form.stage == CURVE:
                 speed = form.apply(path, fit.values[fit.slice_of(key)])
                 slope = np.diff(speed, axis=0) / np.maximum(np.diff(grid, axis=0), 1e-9)
-                if (slope < _LEAST_RESPONSE * (speed / np.maximum(grid, 1e-9))[1:]).any():
+                if (slope < least_response * (speed / np.maximum(grid, 1e-9))[1:]).any():
                     return False
         return True
 
@@ -589,7 +584,8 @@ class SpeedSearch:
         makes up for whatever keeps the rotors apart."""
         paths = [SpeedPath(*own, self.problem.full_speed) for own in self.problem.commands]
         held = np.concatenate([form.apply(p, values) != p.speed for p in paths])
-        return bool(held.mean(axis=0).max() > _MOST_LIMITED)
+        most_limited = 0.5  # Share of the time that a limit may hold a rotor.
+        return bool(held.mean(axis=0).max() > most_limited)
 
     def negligible(self, fit: SpeedFit, key: str) -> bool:
         """Whether an id's parameters are all closer to changing nothing than their own limits.
@@ -679,8 +675,9 @@ def at_its_bounds(form: SpeedForm, values: np.ndarray) -> bool:
 
     An edge at which a parameter does nothing (a lag of no time) is none.
     """
+    at_bound = 1e-3  # Share of a parameter's range from its bound within which the bound holds it.
     for value, own, neutral in zip(values, form.parameters, form.neutral, strict=True):
-        reach = _AT_BOUND * (own.high - own.low)
+        reach = at_bound * (own.high - own.low)
         if any(abs(value - edge) < reach < abs(neutral - edge) for edge in (own.low, own.high)):
             return True
     return False

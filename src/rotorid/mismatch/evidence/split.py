@@ -22,14 +22,6 @@ from rotorid.recordings import RecordingSet, Run, Split
 from rotorid.recordings import columns as c
 
 HELD_OUT_SHARE = 1 / 3
-_MOST_CHOICES = 500
-_MOST_OF_A_KIND = 2 / 3
-"""Share of what is done of some kind from which a run does it alone: it cannot be shared, and is fitted."""
-_LEAST_ON_A_SIDE = 0.05
-"""Share of what is done of which a side of the split has hardly any: less is no worse."""
-_WORTH_MOVING = 0.05
-"""Gain of a choice over the even one, nats, from which it is taken."""
-_NEAR_GROUND_M = 0.3
 GAP_S = 2.0
 """Gap between the fitted and the held-out part of a single run: longer than any memory tested."""
 
@@ -92,30 +84,36 @@ def _chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:
     if total < 3:
         return even
     groups = [g / g.sum() for g in _activity(recordings) if g.sum() > 0]
-    alone = {int(np.argmax(g)) for g in groups if g.max() > _MOST_OF_A_KIND}
-    shared = [g for g in groups if g.max() <= _MOST_OF_A_KIND]
+    # Share of what is done of some kind from which a run does it alone: it cannot be shared, and is fitted.
+    most_of_a_kind = 2 / 3
+    alone = {int(np.argmax(g)) for g in groups if g.max() > most_of_a_kind}
+    shared = [g for g in groups if g.max() <= most_of_a_kind]
+
+    least_on_a_side = 0.05  # Share of what is done of which a side of the split has hardly any: less is no worse.
 
     def score(choice: tuple[int, ...]) -> float:
         if alone.intersection(choice):
             return -np.inf
         held = np.array([share[list(choice)].sum() for share in shared])
-        logs = [np.log(np.maximum(x, _LEAST_ON_A_SIDE)) for x in (held, 1.0 - held)]
+        logs = [np.log(np.maximum(x, least_on_a_side)) for x in (held, 1.0 - held)]
         return float(np.sum(HELD_OUT_SHARE * logs[0] + (1.0 - HELD_OUT_SHARE) * logs[1])) / max(len(groups), 1)
 
     chosen = even
+    worth_moving = 0.05  # Gain of a choice over the even one, nats, from which it is taken.
     for number in range(count, max(count, total // 2) + 1):
         best = max(_choices(total, number), key=score)
-        if score(best) > score(chosen) + _WORTH_MOVING:
+        if score(best) > score(chosen) + worth_moving:
             chosen = best
     return chosen
 
 
 def _choices(total: int, count: int) -> list[tuple[int, ...]]:
     """Ways to take `count` of `total` runs: all of them, or as many drawn at random as are looked at."""
-    if comb(total, count) <= _MOST_CHOICES:
+    most_choices = 500
+    if comb(total, count) <= most_choices:
         return list(combinations(range(total), count))
     draw = np.random.default_rng(0)
-    return [tuple(sorted(int(k) for k in draw.permutation(total)[:count])) for _ in range(_MOST_CHOICES)]
+    return [tuple(sorted(int(k) for k in draw.permutation(total)[:count])) for _ in range(most_choices)]
 
 
 def _kinds_of_activity(recordings: RecordingSet) -> list[tuple[str, ...]]:
@@ -144,7 +142,8 @@ def _activity(recordings: RecordingSet) -> list[np.ndarray]:
             )
     heights = [_height_of(run, vehicle.ground_z_m) for run in recordings.runs]
     if all(h is not None for h in heights):
-        out.append(_energies([1.0 / (_NEAR_GROUND_M + np.maximum(h, 0.0)) ** 2 for h in heights], recordings.runs))
+        near_ground_m = 0.3
+        out.append(_energies([1.0 / (near_ground_m + np.maximum(h, 0.0)) ** 2 for h in heights], recordings.runs))
     return out
 
 

@@ -17,9 +17,6 @@ from scipy.signal import cont2discrete, lfilter
 from rotorid.effects.contract import Contribution, Effect, Form, Motion, Parameter
 from rotorid.effects.loading import AXES, on_channels
 
-_SWING_DAMPING = 0.05
-_SWING_STARTS_RAD_S = (4.0, 8.0, 16.0)
-
 
 def _to_body(motion, world):
     return np.einsum("nji,nj->ni", motion.rotation, world)
@@ -55,7 +52,8 @@ def _swinging(motion, vehicle, values):
     """q'' + 2 ζ ω q' + ω² q = -a in the rotor plane; F = k_f ω² q, M = k_m (q × e_D): a mass that swings inside."""
     k_f, k_m, omega = values
     dt = float(np.median(np.diff(motion.time_s))) if motion.size > 1 else 0.01
-    system = ([-1.0], [1.0, 2 * _SWING_DAMPING * omega, omega**2])
+    swing_damping = 0.05
+    system = ([-1.0], [1.0, 2 * swing_damping * omega, omega**2])
     numerator, denominator, _ = cont2discrete(system, dt, method="bilinear")
     q = np.zeros((motion.size, 3))
     q[:, :2] = lfilter(numerator.ravel(), denominator, motion.specific_force[:, :2], axis=0)
@@ -81,7 +79,8 @@ def _heading_forms(vehicle):
 
 
 def _swing_forms(vehicle):
-    rate = Parameter("ω", "rad/s", 1.5, 40.0, nonlinear=True, starts=_SWING_STARTS_RAD_S)
+    swing_starts_rad_s = (4.0, 8.0, 16.0)
+    rate = Parameter("ω", "rad/s", 1.5, 40.0, nonlinear=True, starts=swing_starts_rad_s)
     return (
         Form(
             "swing",
@@ -179,12 +178,6 @@ DEPENDS_ON = {
     "unknown_gain": ("load", "time_s"),
 }
 """Regime variables that each depends on, for the verdict."""
-_LEAST_CLIMB = 0.25
-"""Spread of the height (one sigma) relative to its mean from which a force that follows it differs from a weight: six
-percent of its energy are its own."""
-_LEAST_TURN_RAD = 0.25
-"""Spread of the heading (one sigma) from which a moment that keeps its direction in the world differs from one that
-turns with the vehicle: 14 degrees move a quarter of it elsewhere."""
 
 
 def empirical_effects(motions: Sequence[Motion]) -> list[Effect]:
@@ -198,7 +191,10 @@ def empirical_effects(motions: Sequence[Motion]) -> list[Effect]:
         return kept
     places = np.concatenate([m.position for m in motions])
     middle = np.nanmean(places, axis=0)
-    if np.nanstd(places[:, 2]) > _LEAST_CLIMB * abs(middle[2]):
+    # Spread of the height (one sigma) relative to its mean from which a force that follows it differs from a weight:
+    # six percent of its energy are its own.
+    least_climb = 0.25
+    if np.nanstd(places[:, 2]) > least_climb * abs(middle[2]):
         return kept
 
     def about_middle(vehicle):
@@ -218,5 +214,8 @@ def can_show(effect_id: str, rotations: list[np.ndarray | None]) -> bool:
         return True
     noses = np.concatenate([r[:, 0, 0] + 1j * r[:, 1, 0] for r in rotations])
     noses = noses / np.maximum(np.abs(noses), 1e-12)
+    # Spread of the heading (one sigma) from which a moment that keeps its direction in the world differs from one that
+    # turns with the vehicle: 14 degrees move a quarter of it elsewhere.
+    least_turn_rad = 0.25
     # Of a normally spread heading the mean nose is exp(-sigma² / 2) long.
-    return bool(np.abs(noses.mean()) < np.exp(-0.5 * _LEAST_TURN_RAD**2))
+    return bool(np.abs(noses.mean()) < np.exp(-0.5 * least_turn_rad**2))

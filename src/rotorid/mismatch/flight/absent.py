@@ -26,11 +26,6 @@ from rotorid.mismatch.flight.delivered import FittedModel, Values
 from rotorid.mismatch.flight.wrench import WrenchModel, whitened
 from rotorid.recordings import Vehicle
 
-_ABSORBED_P = 1e-6
-"""About fifty terms are looked at."""
-_ABSORBED_GAIN = 50.0
-"""Whitened squares: what a reader would have taken for an effect."""
-
 
 def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
     """Upper limits of the ids that the fitted runs were tested for and that are not at work, the largest first.
@@ -93,12 +88,14 @@ def absorbed_findings(model: FittedModel, values: Values, findings: list[Finding
     held = [k for k in search.always if k not in values]
     base = regression.fit(held + active)
     taken, out = {f.id for f in findings}, {}
+    absorbed_p = 1e-6  # About fifty terms are looked at.
+    absorbed_gain = 50.0  # Whitened squares: what a reader would have taken for an effect.
     for term in regression.terms:
         if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
             continue
         fit = regression.fit([*held, *active, term.key])
         p = regression.wald(fit, regression.columns([term.key]), search.blocks)
-        if p < _ABSORBED_P and fit.gain - base.gain > _ABSORBED_GAIN:
+        if p < absorbed_p and fit.gain - base.gain > absorbed_gain:
             name = catalogue()[term.effect].name
             text = f"{name} looked significant with the believed values; the refitted values explain it"
             out[term.effect] = Finding(id=term.effect, status="absorbed", sentence=text, p_value=p)

@@ -27,14 +27,6 @@ from rotorid.mismatch.evidence.speedpath import CommandChain
 from rotorid.mismatch.flight.prepare import Prepared
 from rotorid.mismatch.flight.wrench import caused
 
-_BEYOND_TRUST = 2.0
-"""Standard deviations of trust up to which a value may move: beyond, something else is missing that pulls at it."""
-_BETTER_RATIO = 0.95
-"""Held-out error over that with the values as believed which some channel must reach for the values to move."""
-_WORSE_RATIO = 1.01
-_LEAST_Z = 2.0
-"""Standard errors over blocks of a second by which squares must have changed, either way."""
-_WORTH_A_WORD = 0.002
 GAINS_OF_COMMANDS = (0.5, 2.0)
 """Factors of thrust and moments, from commands alone, within which they are values: commands that follow gusts feign a
 vehicle that does not answer, of which half a second ahead seems well predicted."""
@@ -177,7 +169,9 @@ def all_free(model: FittedModel, values: Values, active: Sequence[str]) -> tuple
 def _pushed_beyond_trust(model: FittedModel, moved: Values) -> bool:
     """Whether one of the changes of values not called wrong is beyond its trust."""
     trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
-    return any(abs(change) > _BEYOND_TRUST * trust[k] for k, (change, _) in moved.items())
+    # Standard deviations of trust up to which a value may move: beyond, something else is missing that pulls at it.
+    beyond_trust = 2.0
+    return any(abs(change) > beyond_trust * trust[k] for k, (change, _) in moved.items())
 
 
 def changes(model: FittedModel, values: Values, active: Sequence[str], fit: Fit) -> Values:
@@ -236,14 +230,19 @@ def _pays(plain: list[np.ndarray], free: list[np.ndarray], held: list[np.ndarray
     Residuals (n, 6 or more) of every stretch without and with it, masks of the held-out rows, rows of a block.
     """
     ratio, z = growth(plain, free, held, per)
-    worse, better = (ratio > _WORSE_RATIO) & (z > _LEAST_Z), (ratio < _BETTER_RATIO) & (z < -_LEAST_Z)
+    # Held-out error over that with the values as believed which some channel must reach for the values to move.
+    better_ratio = 0.95
+    worse_ratio = 1.01
+    least_z = 2.0  # Standard errors over blocks of a second by which squares must have changed, either way.
+    worse, better = (ratio > worse_ratio) & (z > least_z), (ratio < better_ratio) & (z < -least_z)
     return rules.SETTLED(bool(better.any() and not worse.any()))
 
 
 def in_words(moved: Values, names: Mapping[str, str] = PARAMETER_NAMES) -> tuple[str, ...]:
     """Changes that are worth a word: `thrust coefficient −0.7 ± 0.2 %`."""
+    worth_a_word = 0.002
     return tuple(
         f"{parameter_words(names[k])[0]} {100 * change:+.1f} ± {196 * sd:.1f} %".replace("-", "−")
         for k, (change, sd) in moved.items()
-        if abs(change) > max(_WORTH_A_WORD, sd)
+        if abs(change) > max(worth_a_word, sd)
     )

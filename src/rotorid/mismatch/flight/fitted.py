@@ -63,17 +63,6 @@ TAKEN_UP = "without recorded rotor speeds it is one with the curve between throt
 FOLLOWED = "in this recording commands follow roll and pitch, and not roll and pitch the commands"
 """Why what turns a vehicle is not asked for where its controller answers disturbances alone."""
 _GAINS_OF_MOMENTS = frozenset({"torque", "arm", "inertia_xx", "inertia_yy", "inertia_zz"})
-_RUN_P = 1e-6
-_RUN_SPREAD = 0.007
-"""Relative spread of the thrust coefficient between runs below which one number serves all."""
-_RUN_TRUST = 0.02
-"""Relative one-sigma of a run's own thrust about the common one."""
-
-_ASKING = 0.5
-"""Share of what a swing costs that it must explain next to the model that stands for a search with it."""
-_ROUNDS, _CHAIN_ROUNDS = 4, 2
-_MOVED = 0.3
-"""Standard errors by which coefficients may move between rounds: columns hang on accelerations that they predict."""
 
 
 @dataclass(frozen=True)
@@ -156,8 +145,9 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
         segments, noisy, model = _with_payload(prepared, model, windows)
     segments, noisy, model = _with_swing(prepared, model)
     terms = list(model.terms)
+    rounds = 4
     for number in range(
-        _ROUNDS if any(_changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0
+        rounds if any(_changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0
     ):
         refined = refine_nonlinear(prepared, model, segments, wide=number == 0)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
@@ -174,12 +164,14 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
 
 
 def _converged(before: WrenchModel, after: WrenchModel) -> bool:
-    """Whether two rounds have the same terms at work, and no coefficient that moved by MOVED of its error."""
+    """Whether two rounds have the same terms at work, and no coefficient that moved by `moved` of its error."""
     if set(before.selection.active) != set(after.selection.active):
         return False
+    # Standard errors by which coefficients may move between rounds: columns hang on accelerations that they predict.
+    moved = 0.3
     for key in after.selection.active:
         (old, _), (new, covariance) = (coefficients(m.regression, m.selection.fit, key) for m in (before, after))
-        if np.any(np.abs(new - old) > _MOVED * np.sqrt(np.diag(covariance))):
+        if np.any(np.abs(new - old) > moved * np.sqrt(np.diag(covariance))):
             return False
     return True
 
@@ -257,7 +249,8 @@ def _asks_for_a_swing(prepared: Prepared, model: WrenchModel, term: Term, segmen
     regression = regression_of(prepared, asked, effects, segments, model.regression.filters)
     keys = [t.key for t in asked]
     gain = regression.explained(keys) - regression.explained(keys[:-1])
-    return gain > _ASKING * price(segments)
+    asking = 0.5  # Share of what a swing costs that it must explain next to the model that stands for a search with it.
+    return gain > asking * price(segments)
 
 
 def _is_like(term: Term, other: Term) -> bool:
@@ -279,20 +272,23 @@ def _changes_its_columns(form: Form) -> bool:
 
 
 def _thrust_differs(model: WrenchModel) -> bool:
-    """Whether the thrust coefficient is not the same in every run, beyond doubt and by more than RUN_SPREAD."""
+    """Whether the thrust coefficient is not the same in every run, beyond doubt and by more than `run_spread`."""
     if "thrust" not in model.search.terms or not all(s.measured_speed for s in model.prepared.segments):
         return False
     regression = model.search.regression
     fit = regression.fit(model.search.always + model.selection.active)
     spread, p = regression.between_runs(fit, "thrust")
     runs = len(np.unique(regression.run[regression.training]))
-    return p < _RUN_P and float(np.sqrt(spread[0] * runs)) > _RUN_SPREAD
+    run_p = 1e-6
+    run_spread = 0.007  # Relative spread of the thrust coefficient between runs below which one number serves all.
+    return p < run_p and float(np.sqrt(spread[0] * runs)) > run_spread
 
 
 def _with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
     """Terms with a thrust scale for each run: air density, other propellers, a tachometer's own error."""
     runs = dict.fromkeys([*(s.run for s in prepared.segments), *prepared.unseen])
-    return [*terms, *(Term(f"{RUN_SCALE}{r}", "nuisance", prior_sd=(_RUN_TRUST,), run=r) for r in runs)]
+    run_trust = 0.02  # Relative one-sigma of a run's own thrust about the common one.
+    return [*terms, *(Term(f"{RUN_SCALE}{r}", "nuisance", prior_sd=(run_trust,), run=r) for r in runs)]
 
 
 def _cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:

@@ -28,20 +28,9 @@ from rotorid.mismatch.evidence.regression import DOUBT_OF_CORRECTION, Regression
 from rotorid.mismatch.evidence.rows import winds_last
 from rotorid.mismatch.flight.delivered import GAINS_OF_COMMANDS, Values
 from rotorid.mismatch.flight.prepare import assemble_rows
-from rotorid.mismatch.flight.wrench import WrenchModel, after_residual, chosen, model_filters, whitened
+from rotorid.mismatch.flight.wrench import WrenchModel, after_residual, chosen, whitened
 from rotorid.recordings.signal.kernels import low_pass
 
-_VALUE_BAND = (0.2, 0.6)
-"""Shares of the cutoff. Below, disturbances and what the controller does about them; above, mostly the noise of the
-body rates' derivative, and their sensor's own filter."""
-_LEAST_REACHED = 0.5
-"""Share of the rows in stretches longer than the band-pass, without which all frequencies judge."""
-_MOMENTS = (3, 4, 5)
-"""Channels of the moments."""
-_LEAST_SHARE = 1e-3
-"""Of a believed value what an estimate is at least: of what is not excited it may be anything."""
-_NEVER_SHOWN = 1e-6
-"""Whitened squares of a value's column up to which the flight shows nothing of it."""
 _FREE_SD = 3.0
 """Relative one-sigma of the value by which a gain is estimated."""
 
@@ -94,8 +83,11 @@ def gains_of(model: WrenchModel, prior: Prior) -> dict[str, LogGain]:
     """
     every, free = model.search.regression, [k for k in GAINS if k in model.regression.keys_of("value")]
     measured = all(s.measured_speed for s in model.segments)
-    quick = _band_filters(model, _VALUE_BAND) if measured else {}
-    known = {None: model_filters(model)} | ({_VALUE_BAND: {**model_filters(model), **quick}} if quick else {})
+    # Shares of the cutoff. Below, disturbances and what the controller does about them; above, mostly the noise of the
+    # body rates' derivative, and their sensor's own filter.
+    value_band = (0.2, 0.6)
+    quick = _band_filters(model, value_band) if measured else {}
+    known = {None: model.regression.filters} | ({value_band: {**model.regression.filters, **quick}} if quick else {})
     bands, answered = [], {}
     for (band, filters), bias in zip(known.items(), prior.gain_bias, strict=False):
         forward = every if band is None else _regression_of_gains(model, filters)
@@ -171,8 +163,9 @@ def _gain_of(coefficient: float, turned: bool) -> float:
 
     `turned` says that the column holds what the believed value makes of a force or moment (`decide.relative_change`).
     """
+    least_share = 1e-3  # Of a believed value what an estimate is at least: of what is not excited it may be anything.
     return float(
-        np.log(max(1.0 - coefficient, _LEAST_SHARE)) if turned else -np.log(max(1.0 + coefficient, _LEAST_SHARE))
+        np.log(max(1.0 - coefficient, least_share)) if turned else -np.log(max(1.0 + coefficient, least_share))
     )
 
 
@@ -229,7 +222,8 @@ def _own_part_of(
     inverse = ridge_inverse(gram[np.ix_(others, others)] + np.diag(precision[others]))
     energy = float(gram[own, own] - gram[own, others] @ inverse @ gram[others, own])
     noise = float(regression.bias_gram[own, own] * regression.training.mean())
-    return (energy, noise / energy) if energy > _NEVER_SHOWN else (0.0, 1.0)
+    never_shown = 1e-6  # Whitened squares of a value's column up to which the flight shows nothing of it.
+    return (energy, noise / energy) if energy > never_shown else (0.0, 1.0)
 
 
 def _samples_in(model: WrenchModel, band: tuple[float, float] | None) -> dict[str, float]:
@@ -272,10 +266,13 @@ def _band_filters(model: WrenchModel, band: tuple[float, float]) -> dict[int, np
     slow, quick = (low_pass(thinner.rate_hz, share * thinner.cutoff_hz) for share in band)
     middle = np.convolve(np.eye(len(slow))[len(slow) // 2] - slow, quick)
     parts = [part for part in after_residual(model) if len(part) > len(middle)]
-    if sum(len(part) for part in parts) < _LEAST_REACHED * sum(len(r.y) for r in model.rows):
+    # Share of the rows in stretches longer than the band-pass, without which all frequencies judge.
+    least_reached = 0.5
+    if sum(len(part) for part in parts) < least_reached * sum(len(r.y) for r in model.rows):
         return {}
     out = {}
-    for c in set(_MOMENTS) & set(model_filters(model)):
+    moments = (3, 4, 5)  # Channels of the moments.
+    for c in set(moments) & set(model.regression.filters):
         left = np.concatenate([np.convolve(part[:, c], middle, "valid") for part in parts])
         out[c] = middle / (np.sqrt(_copies_in(model, band)) * left.std())
     return out

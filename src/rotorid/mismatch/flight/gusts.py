@@ -31,22 +31,12 @@ from rotorid.mismatch.flight.wrench import (
     WrenchModel,
     after_residual,
     chosen,
-    model_filters,
     whitened,
     with_linear,
     wrench_model,
 )
 from rotorid.steps import step
 
-_SMOOTHING_S = 0.6
-_ALARM = 6.0
-"""Robust standard deviations of the smoothed world force that open a window."""
-_EDGE = 2.5
-"""A window reaches to where the smoothed force falls below this many."""
-_SHORTEST_S, _LONGEST_SHARE = 1.0, 0.5
-"""A window is never shorter than the smoothing itself; one of a blip is as short."""
-_BURST_KNOT_S = 0.6
-_MOST_WINDOWS = 3
 _KNOT_S, _RESTLESS_KNOT_S = 0.3, 1.0
 """Distance of knots in a window, where a gust may set in within a fraction of a second, and where the wind changes
 all the time."""
@@ -55,13 +45,6 @@ _MOST_KNOTS = 150
 strongest are looked at."""
 _RESTLESS_SHARE = 0.5
 """A wind that never rests must take away more than this share of the energy left in the horizontal force."""
-_FOLLOWS = 0.5
-"""Share of the squares of a wind that the vehicle's own velocity may explain."""
-_LASTING_S = 12.0
-"""A wind that changes for longer has no one height: its root mean square is stated."""
-_MOST_EXTRAPOLATION = 1.05
-"""Speed in a window, relative to the fastest that is fitted, up to which the drag is known."""
-_GUST_P = 1e-6
 _BESIDE_A_BURST = 1.0
 """Size, in units of the noise, of a gust that is believed where a stronger one blew: left out, it would be noise to the
 others."""
@@ -256,7 +239,9 @@ def _beyond_fitted(model: WrenchModel, run: str, start_s: float, stop_s: float) 
         window = (time_s >= start_s) & (time_s <= stop_s) & ~known
         if s.run == run and window.any():
             inside.append(float(speed[window].max()))
-    return max(inside) > _MOST_EXTRAPOLATION * max(fitted)
+    # Speed in a window, relative to the fastest that is fitted, up to which the drag is known.
+    most_extrapolation = 1.05
+    return max(inside) > most_extrapolation * max(fitted)
 
 
 def _feels_wind(model: WrenchModel) -> bool:
@@ -334,7 +319,8 @@ def believed(gusts: list[Gust], model: WrenchModel) -> list[Gust]:
     A wind that is a small share of the airspeed is what the drag's form is wrong by.
     """
     share = rules.OVERSHADOWED["share_of_burst"]
-    known = [g for g in gusts if g.p_value < _GUST_P]
+    gust_p = 1e-6
+    known = [g for g in gusts if g.p_value < gust_p]
     sizes = [(g, size_of(g, model)) for g in known if not rules.OVERSHADOWED(share_of_airspeed(g, model) < share)]
     if max((size for _, size in sizes), default=0.0) <= rules.OVERSHADOWED["times_for_burst"]:
         return []
@@ -356,7 +342,8 @@ def _follows_velocity(gusts: Sequence[Gust], model: WrenchModel) -> bool:
     wind, velocity = np.concatenate(winds), np.concatenate(flown)
     share = float((wind * velocity).sum() / max(float((velocity**2).sum()), 1e-12))
     left = float(((wind - share * velocity) ** 2).sum())
-    return abs(share) < 1.0 and left < (1.0 - _FOLLOWS) * float((wind**2).sum())
+    follows = 0.5  # Share of the squares of a wind that the vehicle's own velocity may explain.
+    return abs(share) < 1.0 and left < (1.0 - follows) * float((wind**2).sum())
 
 
 def share_of_airspeed(gust: Gust, model: WrenchModel) -> float:
@@ -419,7 +406,7 @@ def estimated(prepared: Prepared, model: WrenchModel, winds: dict[str, tuple[Ter
     for _ in range(steps):
         moved = _in_gusts(model.segments, winds)
         rows = assemble_rows(prepared, own, moved, effects)
-        regression = whitened(prepared, rows, own, model_filters(model), moved)
+        regression = whitened(prepared, rows, own, model.regression.filters, moved)
         fit = regression.fit([t.key for t in own])
         effects = [with_linear(e, regression, fit, t) for t, e in zip(active, effects, strict=True)]
         for term in asked:
@@ -446,7 +433,8 @@ def _step_of(regression: Regression, fit: Fit, term: Term) -> tuple[np.ndarray, 
 def gust_finding(gusts: tuple[Gust, ...]) -> Finding:
     """All gusts of a set as one finding, the surest one's wind as its parameters."""
     first = min(gusts, key=lambda g: g.p_value)
-    lasting = first.knots_s[-1] - first.knots_s[0] > _LASTING_S
+    lasting_s = 12.0  # A wind that changes for longer has no one height: its root mean square is stated.
+    lasting = first.knots_s[-1] - first.knots_s[0] > lasting_s
     height, sd = first.unrest() if lasting else first.height()
     symbol = "w_{}_rms" if lasting else "w_{}"
     effect = moving_air("in windows")
@@ -473,23 +461,29 @@ def windows(residual_body: np.ndarray, rotation: np.ndarray, time_s: np.ndarray)
     """
     world = np.einsum("nij,nj->ni", rotation, residual_body)[:, :2]
     dt = float(np.median(np.diff(time_s)))
-    smooth = uniform_filter1d(world - np.median(world, axis=0), max(3, int(_SMOOTHING_S / dt)), axis=0)
+    smoothing_s = 0.6
+    smooth = uniform_filter1d(world - np.median(world, axis=0), max(3, int(smoothing_s / dt)), axis=0)
     scale = max(1.4826 * np.median(np.abs(smooth - np.median(smooth, axis=0)), axis=0).max(), 1e-12)
     strength = np.linalg.norm(smooth, axis=1) / scale
     found = []
     left = strength.copy()
-    while len(found) < _MOST_WINDOWS:
+    alarm = 6.0  # Robust standard deviations of the smoothed world force that open a window.
+    edge = 2.5  # A window reaches to where the smoothed force falls below this many.
+    # A window is never shorter than the smoothing itself; one of a blip is as short.
+    shortest_s, longest_share = 1.0, 0.5
+    most_windows = 3
+    while len(found) < most_windows:
         top = int(np.argmax(left))
-        if left[top] < _ALARM:
+        if left[top] < alarm:
             break
         low, high = top, top
-        while low > 0 and strength[low - 1] > _EDGE:
+        while low > 0 and strength[low - 1] > edge:
             low -= 1
-        while high < len(strength) - 1 and strength[high + 1] > _EDGE:
+        while high < len(strength) - 1 and strength[high + 1] > edge:
             high += 1
         left[low : high + 1] = 0.0
         length = (high - low) * dt
-        if _SHORTEST_S <= length <= _LONGEST_SHARE * len(strength) * dt:
+        if shortest_s <= length <= longest_share * len(strength) * dt:
             found.append((float(time_s[low]), float(time_s[high]), float(strength[top])))
     return found
 
@@ -497,8 +491,9 @@ def windows(residual_body: np.ndarray, rotation: np.ndarray, time_s: np.ndarray)
 def gust_terms(run: str, found) -> list[Term]:
     """Terms for the windows of one run."""
     terms, gust = [], moving_air("in windows").id
+    burst_knot_s = 0.6
     for start, stop, _ in found:
-        knots = int(np.clip(round((stop - start) / _BURST_KNOT_S), 2, 12))
+        knots = int(np.clip(round((stop - start) / burst_knot_s), 2, 12))
         form = window_form(start - 0.15, stop + 0.15, knots)
         size = len(form.parameters)
         terms.append(

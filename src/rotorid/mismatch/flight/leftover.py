@@ -36,19 +36,6 @@ ALARM_P = 1e-5
 """A residual depends on the inputs where the p-value is below this."""
 SMALLEST_SHARE_OF_NOISE = 0.3
 """A left-over dependence below this share of the noise is not worth a word."""
-_BLOCK_S = 2.0
-_SLOW_BANDS_HZ = ((0.15, 0.7), (0.7, 2.5))
-_FAST_BAND = (0.3, 0.75)
-"""Band, as shares of the cutoff, that shows by how much the sensors' noise is more than its white part."""
-_SLOW_EXCESS = 16.0
-"""Times more power than the sensors' noise, relative to the fast band, that slow changes must have to be noise no
-more: coloured noise of the sensors stays below four, see benchmarks/mismatch.md."""
-_WELCH_S = 8.0
-_ACROSS = (0, 1)
-"""Channels of the force across the rotors' axis: what rotors make of their commands is not known well enough for the
-others."""
-_UNCLAIMED = 3.0
-"""Energy relative to the noise's from which what only free values explain counts by itself, without any claim."""
 _LEAST_NOISE = 0.1
 """Share of what a flexible regression leaves that is noise, whatever else moves in it."""
 
@@ -100,8 +87,10 @@ def leftover(
     full = model.full_fit()
     added = model.contributions.of(full.columns, full.beta)
     slow = slow_excess(prepared, model, segments, noisy, added)
+    # Energy relative to the noise's from which what only free values explain counts by itself, without any claim.
+    unclaimed = 3.0
     channels = _channels_of(
-        prepared, model, segments, full, added, slow, p_after, delivered, 1.0 if claimed else _UNCLAIMED
+        prepared, model, segments, full, added, slow, p_after, delivered, 1.0 if claimed else unclaimed
     )
     left = [c for c in channels if c.counts]
     if not left:
@@ -253,10 +242,19 @@ def slow_excess(prepared, model, segments, noisy, contributions) -> dict[str, tu
     if not noisy:
         return {}
     rate = prepared.thinner.rate_hz
-    fast = tuple(share * prepared.thinner.cutoff_hz for share in _FAST_BAND)
+    # Band, as shares of the cutoff, that shows by how much the sensors' noise is more than its white part.
+    fast_band = (0.3, 0.75)
+    fast = tuple(share * prepared.thinner.cutoff_hz for share in fast_band)
     noise = _added_noise(prepared, segments, noisy)
     out = {}
-    for c in range(6) if all(s.measured_speed for s in segments) else _ACROSS:
+    slow_bands_hz = ((0.15, 0.7), (0.7, 2.5))
+    # Times more power than the sensors' noise, relative to the fast band, that slow changes must have to be noise no
+    # more: coloured noise of the sensors stays below four, see benchmarks/mismatch.md.
+    least_excess = 16.0
+    # Channels of the force across the rotors' axis: what rotors make of their commands is not known well enough for the
+    # others.
+    across = (0, 1)
+    for c in range(6) if all(s.measured_speed for s in segments) else across:
         if not np.isfinite(model.noise[c]):
             continue
         left = left_by(model.rows, c, contributions)
@@ -268,9 +266,9 @@ def slow_excess(prepared, model, segments, noisy, contributions) -> dict[str, tu
         at = (frequency >= fast[0]) & (frequency <= fast[1])
         level = max(1.0, float(found[at].mean() / max(expected[at].mean(), 1e-300)))
         found = np.minimum(found, _moving(prepared, model, contributions, c, left, rate))
-        for low, high in _SLOW_BANDS_HZ:
+        for low, high in slow_bands_hz:
             band = (frequency >= low) & (frequency < high)
-            if not band.any() or found[band].mean() < _SLOW_EXCESS * level * expected[band].mean():
+            if not band.any() or found[band].mean() < least_excess * level * expected[band].mean():
                 continue
             excess = float(np.sum((found - level * expected)[band]) * (frequency[1] - frequency[0]))
             if np.sqrt(max(excess, 0.0)) < SMALLEST_SHARE_OF_NOISE * model.noise[c]:
@@ -295,8 +293,9 @@ def _moving(prepared, model, contributions, channel: int, left, rate_hz: float) 
 
 
 def _spectrum(parts, rate_hz: float):
-    """Mean power spectrum of stretches of at least WELCH_S: frequency in Hz and density; (None, None) without any."""
-    size = int(_WELCH_S * rate_hz)
+    """Mean power spectrum of stretches of at least `welch_s`: frequency in Hz and density; (None, None) without any."""
+    welch_s = 8.0
+    size = int(welch_s * rate_hz)
     long = [p for p in parts if len(p) >= size]
     if not long:
         return None, None
@@ -425,7 +424,8 @@ def wald(parts, inputs, taps, rate_hz, shared=None, most=1.0, memory=0):
     """
     size = inputs[0].shape[1]
     blocks, stretches, noise = [], [], np.zeros(size)
-    per = max(2, int(_BLOCK_S * rate_hz))
+    block_s = 2.0
+    per = max(2, int(block_s * rate_hz))
     for k, (y, z) in enumerate(zip(parts, inputs, strict=True)):
         yw, zw = _whitened(y, taps), _whitened(z, taps)
         y_noise, z_noise = (0 * yw, 0 * zw) if shared is None else (_whitened(x, taps) for x in shared[k])

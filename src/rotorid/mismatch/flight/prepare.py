@@ -64,19 +64,10 @@ MOST_BYTES = 256e6
 """Of all that is kept; what was made first is forgotten first."""
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
-_LOWEST_TO_MEAN = 1.08
 MOST_S, MOST_SAMPLES, _PIECE_S = 600.0, 100_000, 20.0
 """Longer recordings are represented by pieces: neither memory nor time must grow with an hour's flight."""
-_NOISE_REACH = 5.0
-"""Highest frequency, over the cutoff of the analysis, that a sensor's noise is read from."""
 _OF_THE_BODY = frozenset({"specific_force", "angular_acceleration"})
 """Fields of a motion that effects on the body read, and none on the rotors."""
-_FINEST_HZ = 1.0
-_PIECE_SAMPLES, _SMOOTHED = 256, 9
-"""Samples of the pieces that spectra are averaged over (more where a bin would be wider than FINEST_HZ), and bins that
-are averaged."""
-_MOST_NOISE_SAMPLES = 8192
-"""Samples of a column that its noise level is read from."""
 
 
 class Watched(Motion):
@@ -153,16 +144,22 @@ def white_level(values: np.ndarray, rate_hz: float, highest_hz: float = np.inf) 
     Above `highest_hz` nobody looks: a gyroscope that smooths its own reading has next to no noise there, and all the
     same noise below.
     """
-    pieces = max(1, int(np.ceil(rate_hz / _FINEST_HZ / _PIECE_SAMPLES)))
-    values = values[np.isfinite(values)][: _MOST_NOISE_SAMPLES * pieces]
+    finest_hz = 1.0
+    # Samples of the pieces that spectra are averaged over (more where a bin would be wider than `finest_hz`), and bins
+    # that are averaged.
+    piece_samples, smoothed = 256, 9
+    pieces = max(1, int(np.ceil(rate_hz / finest_hz / piece_samples)))
+    most_noise_samples = 8192  # Samples of a column that its noise level is read from.
+    values = values[np.isfinite(values)][: most_noise_samples * pieces]
     if len(values) < 64:
         return 0.0
-    frequency, density = welch(values, fs=1.0, nperseg=min(_PIECE_SAMPLES * pieces, len(values) // 2))
-    smooth = np.convolve(density[2:], np.ones(_SMOOTHED) / _SMOOTHED, mode="valid")
-    low = smooth[frequency[_SMOOTHED + 1 :] * rate_hz <= highest_hz]
+    frequency, density = welch(values, fs=1.0, nperseg=min(piece_samples * pieces, len(values) // 2))
+    smooth = np.convolve(density[2:], np.ones(smoothed) / smoothed, mode="valid")
+    low = smooth[frequency[smoothed + 1 :] * rate_hz <= highest_hz]
     smooth = low if len(low) else smooth[:1]
+    lowest_to_mean = 1.08
     # The lowest of some hundred smoothed levels lies below their mean.
-    return float(_LOWEST_TO_MEAN * np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
+    return float(lowest_to_mean * np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
 
 
 def _own_rate_hz(run: Run, column: str) -> float:
@@ -174,7 +171,7 @@ def _own_rate_hz(run: Run, column: str) -> float:
 def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle, cutoff_hz: float = np.inf) -> SensorNoise:
     """White noise per sample of each sensor, one sigma in the columns' own unit, from the data themselves.
 
-    It is read below NOISE_REACH times the cutoff of the analysis, at each sensor's own rate. Each axis has its own:
+    It is read below `noise_reach` times the cutoff of the analysis, at each sensor's own rate. Each axis has its own:
     rotors shake a frame unlike about its axes. Rotors are alike, and the components of an attitude mix as it turns.
     """
     groups = {
@@ -186,9 +183,10 @@ def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle, cutoff_hz: float = np.
         "attitude": c.QUATERNION,
     }
     levels = {}
+    noise_reach = 5.0  # Highest frequency, over the cutoff of the analysis, that a sensor's noise is read from.
     for key, names in groups.items():
         found = [
-            [white_level(run.column(n), _own_rate_hz(run, n), _NOISE_REACH * cutoff_hz) for n in names]
+            [white_level(run.column(n), _own_rate_hz(run, n), noise_reach * cutoff_hz) for n in names]
             for run in runs
             if names and run.has(*names)
         ]

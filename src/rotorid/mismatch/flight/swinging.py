@@ -34,16 +34,6 @@ _SEEN_IN = ((2, 0), (4, 1), (3, 2))
 """Channel and parameter of a load: its mass in the vertical force, its places in the moments of pitch and roll."""
 _BLOCK_S = 0.5
 _SMOOTHED_BLOCKS = 9
-_SWITCH_COST = 30.0
-"""Squares, in units of the blocks' own scatter, that taking up or dropping must explain."""
-_LEAST_BLOCKS = 8
-"""Blocks of either state, of all runs together."""
-_LEAST_STEP = 3.0
-"""Distance of the two plateaus in units of the scatter of a block."""
-_MOST_DRIFT = 0.2
-"""Share of the slow variation of the loads that the two plateaus may leave."""
-_EDGE_S = 1.5
-"""Distance from the border of two blocks within which the instant is looked for."""
 Windows = tuple[tuple[float, float], ...]
 """(start_s, stop_s) of what is on board in a stretch, without end where it is on board from or to its end."""
 _PIECE_S, _PERIODS, _SHORTEST_PIECE_S = 5.0, 2.0, 1.2
@@ -52,17 +42,10 @@ _RATE_HZ = 10.0
 """Rate at which the sideways force is looked at: a swing has less than 2 Hz."""
 _LEAST_SHARE = 0.3
 """Share of the sideways force's squares that a swing must explain: four numbers of five seconds make 0.1 of noise."""
-_CONVERGED = 1e-4
-"""Relative change of squares and state at which a fit ends: far below what noise makes of either."""
-_MOST_STEPS = 40
 _QUARTER, _MOST_LEAN = np.pi / 2, 0.9
 """Phase of a swing from which its first state is seen, rad, and the largest sideways part of a direction."""
 _LOOKED_FOR = (("length_m", 4, 0.02), ("damping_ratio", 1, 1.0), ("length_m", 1, 0.01))
 """What of a cable is looked for in turn: steps to each side of where it is, and the logarithm of one."""
-_HALVED_SHARE = 0.1
-"""Share of a stretch's mean square that the state of a piece may leave; with more the piece is halved."""
-_LARGEST = 3
-"""Pieces that are looked at first: most flights have nothing that swings."""
 
 
 @dataclass(frozen=True)
@@ -255,13 +238,14 @@ def hanging_stretches(
 
 
 def largest_pieces(stretches: Sequence[HangingStretch], cable: Cable) -> list[HangingStretch]:
-    """The LARGEST pieces of stretches with the largest force."""
+    """The few pieces of stretches with the largest force."""
     pieces = [
         s.part(start, start + cable.piece_s)
         for s in stretches
         for start in np.arange(s.time_s[0], s.time_s[-1] - cable.piece_s, cable.piece_s)
     ]
-    return sorted(pieces, key=lambda p: -p.squares)[:_LARGEST]
+    largest = 3  # Pieces that are looked at first: most flights have nothing that swings.
+    return sorted(pieces, key=lambda p: -p.squares)[:largest]
 
 
 def seems_to_swing(stretches: Sequence[HangingStretch], cable: Cable) -> bool:
@@ -286,12 +270,14 @@ def swing_in(stretch: HangingStretch, cable: Cable, mass_kg: float | None) -> _S
     edges = np.linspace(start, stop + 1e-9, max(1, int((stop - start) / cable.piece_s)) + 1)
     spans = list(zip(edges[:-1], edges[1:], strict=True))
     state, states, masses, left = _at_rest(stretch.hanging[0]), [], [], 0.0
+    # Share of a stretch's mean square that the state of a piece may leave; with more the piece is halved.
+    halved_share = 0.1
     while spans:
         first, last = spans.pop(0)
         piece = stretch.part(first, last)
         if len(piece.at_s) > 2 * UNKNOWNS_OF_A_STATE and len(piece.time_s) > 2:
             own, mass, rest = fitted_piece(piece, cable, state, mass_kg)
-            usual = _HALVED_SHARE * stretch.squares * len(piece.at_s) / len(stretch.at_s)
+            usual = halved_share * stretch.squares * len(piece.at_s) / len(stretch.at_s)
             if mass_kg is not None and rest > usual and last - first > 2 * _SHORTEST_PIECE_S:
                 middle = 0.5 * (first + last)
                 spans = [(first, middle), (middle, last), *spans]
@@ -333,8 +319,10 @@ def _fitted_near(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg
         pull = piece.pull(cable, moved(state, move, cable.rate))
         return np.append(((piece.force - mass_of(pull) * pull) / size).ravel(), move)
 
+    converged = 1e-4  # Relative change of squares and state at which a fit ends: far below what noise makes of either.
+    most_steps = 40
     found = least_squares(
-        left, np.zeros(UNKNOWNS_OF_A_STATE), method="lm", ftol=_CONVERGED, xtol=_CONVERGED, max_nfev=_MOST_STEPS
+        left, np.zeros(UNKNOWNS_OF_A_STATE), method="lm", ftol=converged, xtol=converged, max_nfev=most_steps
     ).x
     own = moved(state, found, cable.rate)
     pull = piece.pull(cable, own)
@@ -410,7 +398,8 @@ def _block_loads(left: np.ndarray, columns: np.ndarray, per: int) -> np.ndarray:
 def two_plateaus(loads: Sequence[np.ndarray]) -> list[np.ndarray] | None:
     """Whether a payload is on board by blocks of every stretch; None where loads (blocks, k) are not two plateaus."""
     steps = np.concatenate([np.diff(part, axis=0) for part in loads])
-    if len(steps) < 4 * _LEAST_BLOCKS:
+    least_blocks = 8  # Blocks of either state, of all runs together.
+    if len(steps) < 4 * least_blocks:
         return None
     scatter = 1.4826 * np.median(np.abs(steps), axis=0) / np.sqrt(2)
     if not (scatter > 0).all():
@@ -421,7 +410,7 @@ def two_plateaus(loads: Sequence[np.ndarray]) -> list[np.ndarray] | None:
     states = [part[:, 0] > (low + high) / 2 for part in smooth]
     for _ in range(20):
         everything, inside = np.concatenate(scaled), np.concatenate(states)
-        if min(inside.sum(), (~inside).sum()) < _LEAST_BLOCKS:
+        if min(inside.sum(), (~inside).sum()) < least_blocks:
             return None
         plateaus = np.stack([everything[~inside].mean(axis=0), everything[inside].mean(axis=0)])
         again = [_cheapest_states(part, plateaus) for part in scaled]
@@ -430,10 +419,12 @@ def two_plateaus(loads: Sequence[np.ndarray]) -> list[np.ndarray] | None:
         if same:
             break
     step = plateaus[1] - plateaus[0]
-    if not any(np.diff(s).any() for s in states) or step[0] < _LEAST_STEP:
+    least_step = 3.0  # Distance of the two plateaus in units of the scatter of a block.
+    if not any(np.diff(s).any() for s in states) or step[0] < least_step:
         return None
     rest = [part - plateaus[s.astype(int)] for part, s in zip(scaled, states, strict=True)]
-    return states if _slow_variance(rest) < _MOST_DRIFT * _slow_variance(scaled) else None
+    most_drift = 0.2  # Share of the slow variation of the loads that the two plateaus may leave.
+    return states if _slow_variance(rest) < most_drift * _slow_variance(scaled) else None
 
 
 def _slow_variance(parts: Sequence[np.ndarray]) -> float:
@@ -443,11 +434,12 @@ def _slow_variance(parts: Sequence[np.ndarray]) -> float:
 
 
 def _cheapest_states(loads: np.ndarray, plateaus: np.ndarray) -> np.ndarray:
-    """States (blocks,) of least squares from two plateaus (2, k), each change at SWITCH_COST (Viterbi)."""
+    """States (blocks,) of least squares from two plateaus (2, k), each change at a cost (Viterbi)."""
     costs = ((loads[:, None, :] - plateaus[None]) ** 2).sum(axis=2)
     total, came = np.zeros(2), np.zeros((len(costs), 2), int)
+    switch_cost = 30.0  # Squares, in units of the blocks' own scatter, that taking up or dropping must explain.
     for i, cost in enumerate(costs):
-        moved = total[::-1] + _SWITCH_COST
+        moved = total[::-1] + switch_cost
         came[i] = np.where(moved < total, [1, 0], [0, 1])
         total = np.minimum(total, moved) + cost
     state, out = int(np.argmin(total)), np.zeros(len(costs), bool)
@@ -464,8 +456,9 @@ def change_rows(states: np.ndarray, left: np.ndarray, column: np.ndarray, per: i
     mass = [float((x * y)[state_of == s].sum() / max((x**2)[state_of == s].sum(), 1e-12)) for s in (False, True)]
     errors = np.stack([(y - m * x) ** 2 for m in mass])
     edges = []
+    edge_s = 1.5  # Distance from the border of two blocks within which the instant is looked for.
     for block in np.flatnonzero(np.diff(states)) + 1:
-        middle, reach = block * per, int(_EDGE_S / _BLOCK_S * per)
+        middle, reach = block * per, int(edge_s / _BLOCK_S * per)
         start, stop = max(0, middle - reach), min(len(y), middle + reach)
         before, after = int(states[block - 1]), int(states[block])
         gain = np.cumsum(errors[after, start:stop] - errors[before, start:stop])

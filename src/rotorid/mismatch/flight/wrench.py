@@ -48,28 +48,10 @@ from rotorid.recordings.columns import rotor_columns
 from rotorid.recordings.signal.kernels import causal
 from rotorid.steps import step
 
-_LONGEST_BLOCKS = 400
-_MOST_NOISE = 0.3
-"""Share of a column's energy in a channel that may be noise of the sensors it is made of."""
 SAME_WRENCH = 0.004
 """Share of the spread of the rotors' force or moment to which no model and no recording of them are known."""
-_SIDEWAYS = 0.25
 WORTH_STATING = 3.0
 """Times that share which counts as noise where it is asked whether something matters."""
-_MEMORY_GRID = 37
-"""Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
-
-
-_MOST_P_OF_WIND = 1e-3
-"""p-value up to which a wind is seen by the fit through the drag."""
-ANSWERED_S = 3.0
-"""Seconds over which commands that answer disturbances are averaged: trims are slower, answers quicker."""
-_WIND_ROUNDS = 3
-"""Searches in a wind at most: in moving air another drag may explain more, and through it the wind is another."""
-_SURE_Z = 3.0
-"""Standard errors by which a nuisance must differ from nothing to be delivered."""
-_MOST_INFLATION = 2.0
-"""A residual that the chosen model leaves this many times larger than the noise is itself the better noise."""
 
 
 @dataclass
@@ -126,9 +108,11 @@ class WrenchModel:
         always = [*self.regression.keys_of("wind"), *keys]
         fit = self.regression.fit([*nuisances, *always], loose=loose)
 
+        sure_z = 3.0  # Standard errors by which a nuisance must differ from nothing to be delivered.
+
         def sure(key: str) -> bool:
             beta, covariance = coefficients(self.regression, fit, key)
-            return abs(float(beta[0])) > _SURE_Z * float(np.sqrt(covariance[0, 0]))
+            return abs(float(beta[0])) > sure_z * float(np.sqrt(covariance[0, 0]))
 
         return [*filter(sure, nuisances), *always]
 
@@ -146,9 +130,10 @@ class WrenchModel:
 
 
 def block_seconds(rows: list[Rows], rate_hz: float) -> float:
-    """Length of a block: a second, longer where a recording would give more than LONGEST_BLOCKS."""
+    """Length of a block: a second, longer where a recording would give too many."""
     seconds = sum(len(r.y) for r in rows) / rate_hz
-    return max(1.0 if seconds > 40 else 0.5, seconds / _LONGEST_BLOCKS)
+    longest_blocks = 400
+    return max(1.0 if seconds > 40 else 0.5, seconds / longest_blocks)
 
 
 def channel_floor(segments: list[Segment], vehicle: Vehicle) -> np.ndarray:
@@ -163,8 +148,9 @@ def channel_floor(segments: list[Segment], vehicle: Vehicle) -> np.ndarray:
         force = np.concatenate([force for force, _, _ in parts])
         moment = np.concatenate([arm + torque for _, arm, torque in parts])
         floor[:6] = SAME_WRENCH * np.nanstd(np.hstack([force, moment]), axis=0)
+        sideways = 0.25
         # Along the rotors' axis a command held late is felt at once, sideways by what the vehicle turns meanwhile.
-        floor[:3] = np.maximum(floor[:3], _SIDEWAYS * floor[:3].max())
+        floor[:3] = np.maximum(floor[:3], sideways * floor[:3].max())
     floor[6:9], floor[9:12] = AGREEMENT["accelerometer"], AGREEMENT["gyroscope"]
     return floor
 
@@ -220,7 +206,9 @@ def inflated_channels(remains: list[np.ndarray], noise: np.ndarray) -> np.ndarra
     """Mask of the channels in which residuals (n, 12) are by far larger than their noise (12,)."""
     rms = np.sqrt(sum((p**2).sum(axis=0) for p in remains) / max(1, sum(len(p) for p in remains)))
     with np.errstate(invalid="ignore"):
-        return rms > _MOST_INFLATION * noise
+        # A residual that the chosen model leaves this many times larger than the noise is itself the better noise.
+        most_inflation = 2.0
+        return rms > most_inflation * noise
 
 
 def searched(
@@ -297,6 +285,7 @@ def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_h
     band = tuple(share * cutoff_hz for share in NOISE_BAND)
     seen = np.zeros(rows[0].x.shape[1:], bool)
     colours = {}
+    most_noise = 0.3  # Share of a column's energy in a channel that may be noise of the sensors it is made of.
     for c in range(12):
         added = [b.y[:, c] - a.y[:, c] for a, b in zip(rows, noisy, strict=True)]
         more = 1.0
@@ -304,11 +293,11 @@ def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_h
             power = band_power(added, rate_hz, band)
             more = max(1.0, band_power([r.y[:, c] for r in rows], rate_hz, band) / power) if power > 0 else 1.0
         columns = np.flatnonzero(np.any([r.x[:, c].any(axis=0) for r in rows], axis=0))
-        seen[c, columns] = _noise_of_columns(rows, noisy, c, columns) * more <= _MOST_NOISE
+        seen[c, columns] = _noise_of_columns(rows, noisy, c, columns) * more <= most_noise
         doubtful = columns[~seen[c, columns]]
         if len(doubtful) and np.isfinite(np.concatenate(added)).all():
             taps = autoregression(added)
-            seen[c, doubtful] = _noise_of_columns(rows, noisy, c, doubtful, taps) * more <= _MOST_NOISE
+            seen[c, doubtful] = _noise_of_columns(rows, noisy, c, doubtful, taps) * more <= most_noise
             if seen[c, doubtful].any():
                 colours[c] = taps
     # In place: the columns are the largest arrays of the whole analysis.
@@ -367,7 +356,7 @@ class Seconds:
 def path_segments(segments: list[Segment], chain: CommandChain, cutoff_hz: float) -> list[Segment]:
     """Segments whose rotor speeds are what the chain makes of the commands.
 
-    What commands do in answer to lift or moments is no cause of them: of these the mean over ANSWERED_S counts.
+    What commands do in answer to lift or moments is no cause of them: of these the mean over `answered_s` counts.
     """
     out = []
     for s in segments:
@@ -378,13 +367,15 @@ def path_segments(segments: list[Segment], chain: CommandChain, cutoff_hz: float
 
 
 def caused(speed: np.ndarray, dt_s: float, chain: CommandChain) -> np.ndarray:
-    """Rotor speeds (n, k) with the mean over ANSWERED_S of their collective, and of what they differ by, where these
+    """Rotor speeds (n, k) with the mean over `answered_s` of their collective, and of what they differ by, where these
     are answers."""
     lifted, turned = chain.result.lifted_by_commands, chain.result.turned_by_commands
     if lifted and turned:
         return speed
     squares = speed**2
-    size = min(len(squares) - 1, int(ANSWERED_S / dt_s)) | 1
+    # Seconds over which commands that answer disturbances are averaged: trims are slower, answers quicker.
+    answered_s = 3.0
+    size = min(len(squares) - 1, int(answered_s / dt_s)) | 1
     slow = np.stack([running_mean(column, size) for column in squares.T], axis=1)
     collective, differing = ((squares if own else slow) for own in (lifted, turned))
     parts = collective.mean(axis=1, keepdims=True) + differing - differing.mean(axis=1, keepdims=True)
@@ -473,10 +464,12 @@ def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: in
     low = np.log(max(parameter.low, start / 6, 1e-9) / start)
     high = np.log(min(parameter.high, start * 6) / start)
     if term.form.memory and len(parameter.starts) > 1:
+        # Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima.
+        memory_grid = 37
         # What rings has several minima over its frequency: the search starts about the best of a grid.
-        grid = np.sort(np.append(np.linspace(low, high, _MEMORY_GRID - 1), 0.0))
+        grid = np.sort(np.append(np.linspace(low, high, memory_grid - 1), 0.0))
         best = int(np.argmin([cost(factor) for factor in grid])) if wide else int(np.searchsorted(grid, 0.0))
-        low, high = grid[max(best - 1, 0)], grid[min(best + 1, _MEMORY_GRID - 1)]
+        low, high = grid[max(best - 1, 0)], grid[min(best + 1, memory_grid - 1)]
     found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 0.01, "maxiter": 18})
     return float(start * np.exp(found.x))
 
@@ -508,7 +501,7 @@ def nonlinear_intervals(prepared: Prepared, model: WrenchModel, segments) -> dic
     rows = assemble_rows(prepared, terms + fixed, segments, chosen(model))
     width = sum(t.size for t in terms)
     rows = [replace(r, y=r.y - r.x[:, :, width:].sum(axis=2), x=r.x[:, :, :width]) for r in rows]
-    regression = whitened(prepared, rows, terms, model_filters(model), segments)
+    regression = whitened(prepared, rows, terms, model.regression.filters, segments)
     fit = regression.fit([t.key for t in terms], jackknife=True)
     out = {}
     for term in active:
@@ -531,7 +524,7 @@ def _profile_cost(model: WrenchModel, terms: list[Term], rows: list[Rows], fixed
     size = rows[0].x.shape[2]
     gram, cross, square = np.zeros((size, size)), np.zeros(size), 0.0
     for r in rows:
-        for c, taps in model_filters(model).items():
+        for c, taps in model.regression.filters.items():
             y = causal(taps, r.y[:, c])[12:]
             x = causal(taps, r.x[:, c])[12:]
             if fixed_gain:
@@ -581,7 +574,7 @@ def _with_felt_wind(prepared: Prepared, model: WrenchModel, segments, noisy) -> 
         return model
     always = [t for t in model.terms if t.kind != "effect"]
     asked = [*always, *[model.search.terms[k] for k in active], _wind_term()]
-    regression = regression_of(prepared, asked, forms, in_wind(segments, np.zeros(2)), model_filters(model))
+    regression = regression_of(prepared, asked, forms, in_wind(segments, np.zeros(2)), model.regression.filters)
     keys = [t.key for t in asked]
     seen = regression.compare(keys, keys[:-1])
     if seen.promised.sum() <= LEAST_PROMISE or seen.transfer < LEAST_TRANSFER:
@@ -613,10 +606,12 @@ def _blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
     active = [k for k in active if k != wind_key]
     drags, always = ids_of("drag"), [t for t in terms if t.kind != "effect"]
     had = any(model.search.terms[k].effect in drags for k in active)
-    for _ in range(_WIND_ROUNDS):
+    # Searches in a wind at most: in moving air another drag may explain more, and through it the wind is another.
+    wind_rounds = 3
+    for _ in range(wind_rounds):
         again = None  # of a long flight the columns of one model are half a gigabyte: the last round's go first
         own = [*always, *[model.search.terms[k] for k in active], _wind_term()]
-        found = _fitted_wind(prepared, own, effects, wind, segments, model_filters(model))
+        found = _fitted_wind(prepared, own, effects, wind, segments, model.regression.filters)
         if found is None:
             return model
         wind, sd, effects = found
@@ -652,7 +647,8 @@ def _fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarra
         if np.abs(step).max() < 0.01:
             break
     blown = replace(fit, beta=np.append(fit.beta[:-2], wind))  # the last step from it is all that the fit holds
-    if regression.wald(blown, regression.columns(["wind"]), int(regression.training.sum())) > _MOST_P_OF_WIND:
+    most_p_of_wind = 1e-3  # p-value up to which a wind is seen by the fit through the drag.
+    if regression.wald(blown, regression.columns(["wind"]), int(regression.training.sum())) > most_p_of_wind:
         return None
     return wind, np.sqrt(np.diag(fit.covariance)[-2:]), effects
 
@@ -693,8 +689,3 @@ def after_residual(model: WrenchModel) -> list[np.ndarray]:
     """Residual rows with the selected effects, (n, 12) per segment."""
     full = model.full_fit()
     return [r.y - r.x[:, :, full.columns] @ full.beta for r in model.rows]
-
-
-def model_filters(model: WrenchModel) -> dict[int, np.ndarray]:
-    """Whitening filters that the model's regression was built with."""
-    return model.regression.filters

@@ -83,11 +83,6 @@ _MOST_SHARE = 0.5
 needed where less than this share of what it adds remains given the effect's free form."""
 _FREE = "free form"
 _GAIN = "gain"
-_SHOWS = 0.33
-"""A channel counts where the contribution is at least this share of its strongest, in units of the noise."""
-_REACH = 1.96
-_LOST_SHARE = 0.15
-"""Share of the rotor speeds' mismatch left on the runs held out from which it is said to be unexplained."""
 _SPEED_LEFT = "what was found between command and rotor speed does not carry over to the runs held out"
 
 
@@ -285,7 +280,9 @@ class InstrumentChoice(Choice):
         channels, description = leftover(seen, after, p_after, depends)
         if of_speeds is not None:
             traces += speed_traces(seen.setup, of_speeds)
-            if _speed_left(seen.setup, of_speeds, traces) > _LOST_SHARE:
+            # Share of the rotor speeds' mismatch left on the runs held out from which it is said to be unexplained.
+            lost_share = 0.15
+            if _speed_left(seen.setup, of_speeds, traces) > lost_share:
                 channels = (*channels, *(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count)))
                 depends = [*depends, "battery_voltage_v"] if supply_reason(setup) else depends
                 description = "; ".join([*([description] if description else []), _SPEED_LEFT])
@@ -431,10 +428,13 @@ def reading_findings(model: ReadingModel) -> list[Finding]:
     alternatives = {key: search.alternatives(key, active) for key in active}
     together = _with_alternatives(model, {i for others in alternatives.values() for i in others})
 
+    # A channel counts where the contribution is at least this share of its strongest, in units of the noise.
+    shows = 0.33
+
     def report_of(key: str):
         size = search.ask.sizes_of(key, fit.beta[fit.places(model.regression.columns([key]))])
         order = np.argsort(-size)
-        channels = tuple(CHANNELS[c] for c in order if size[c] > _SHOWS * size[order[0]])
+        channels = tuple(CHANNELS[c] for c in order if size[c] > shows * size[order[0]])
         return active_values(model, key), _parameters_of(model, key, together), channels, alternatives[key]
 
     return findings_of(search, model.selection, report_of)
@@ -473,8 +473,9 @@ def _parameters_of(model: ReadingModel, key: str, together: Iterable[Fit] = ()) 
             )
         return stated
     values, sd = active_values(model, key), nonlinear_deviation(model, key)
+    reach = 1.96
     return tuple(
-        Estimate(p.symbol, float(v), p.unit, float(v - _REACH * s), float(v + _REACH * s))
+        Estimate(p.symbol, float(v), p.unit, float(v - reach * s), float(v + reach * s))
         for p, v, s in zip(term.form.parameters, values, sd, strict=True)
     )
 

@@ -41,12 +41,10 @@ from rotorid.mismatch.instrument.setup import (
 )
 from rotorid.recordings import RecordingSet
 
-_MOST_SAMPLES = 12_000
 _RATE_HZ = 30.0
 """Rate at which wrenches are compared where no speed is measured."""
 _SUB_SAMPLE = 1.2
 """Samples by which the clocks of a command and a wrench may lie apart: no delay."""
-_LEAST_BLOCKS, _MOST_BLOCKS, _STEADY_BLOCKS = 12, 400, 40
 _FREE_SPEED = (np.inf, -0.8, 4.0)
 """One-sigma and bounds of a full speed that nobody states, as a share of the one that it is taken for."""
 _FINER = 4
@@ -277,9 +275,10 @@ class StandPath(PathProblem):
         """About a second each of all stretches together, within bounds on their number; of steady points each row."""
         rows = sum(sizes)
         per = max(int(self.rate_hz / self.average), 2)
-        most = _MOST_BLOCKS if self.coloured else _STEADY_BLOCKS
+        least_blocks, most_blocks, steady_blocks = 12, 400, 40
+        most = most_blocks if self.coloured else steady_blocks
         count = rows if self.short else min(max(rows // per, 1), most)
-        count = max(count, min(_LEAST_BLOCKS, rows // 2), 2)
+        count = max(count, min(least_blocks, rows // 2), 2)
         return [[b for b in np.array_split(np.arange(rows), count) if len(b)]]
 
 
@@ -296,9 +295,10 @@ def supply_reason(setup: PreparedInstrument) -> str | None:
 
 
 def _thinned(loadings: list[Loading]) -> list[Loading]:
-    """Stretches spread over the runs with MOST_SAMPLES at most."""
+    """Stretches spread over the runs with `most_samples` at most."""
     total = sum(x.size for x in loadings)
-    step = max(1, int(np.ceil(total / _MOST_SAMPLES)))
+    most_samples = 12_000
+    step = max(1, int(np.ceil(total / most_samples)))
     return loadings[::step] if len(loadings) >= 4 * step else loadings
 
 

@@ -22,15 +22,9 @@ from rotorid.recordings import columns as c
 
 _CERTAIN = 0.9
 """Correlation of reading and load, in size, from which a slope means something."""
-_FLIPPED = -0.4
-_NEAR_UNIT = 0.12
-"""Relative distance of a slope to a unit's factor within which it is that unit."""
 _FORCE_UNITS = {"kgf": 0.101972, "gf": 101.972, "mN": 1000.0, "lbf": 0.224809, "ozf": 3.59694}
 _MOMENT_UNITS = {"N cm": 100.0, "N mm": 1000.0, "kgf cm": 10.1972, "mN m": 1000.0}
 _SPEED_UNITS = {"rpm": 1.0 / 9.549297**2, "Hz": 6.283185**2, "krpm": (1000.0 / 9.549297) ** 2}
-_LARGEST_ANGLE_RAD = 1.6
-_BETTER = 4.0
-"""Residual energy over the stated order's, below which another order of rotors is the true one."""
 NAMES = c.FORCE + c.MOMENT
 
 
@@ -101,10 +95,11 @@ def _with_runs(recordings: RecordingSet, runs) -> RecordingSet:
 
 def _degrees(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding], list[str]]:
     """Attitude of the mount in degrees: no mount is tilted by more than a right angle."""
+    largest_angle_rad = 1.6
     off = [
         n
         for n in c.MOUNT
-        if any(r.has(n) and np.nanmax(np.abs(r.column(n))) > _LARGEST_ANGLE_RAD for r in recordings.runs)
+        if any(r.has(n) and np.nanmax(np.abs(r.column(n))) > largest_angle_rad for r in recordings.runs)
     ]
     if not off:
         return recordings, [], []
@@ -135,7 +130,8 @@ def _finding(key: str, sentence: str, channels, factor: float | None = None, oth
 
 def _flipped(recordings: RecordingSet, setup: PreparedInstrument):
     """Channels whose reading falls as the load rises, in all runs or in some."""
-    bad = [s for s in _slopes(setup) if s.correlation < -_CERTAIN and s.slope < _FLIPPED]
+    flipped = -0.4
+    bad = [s for s in _slopes(setup) if s.correlation < -_CERTAIN and s.slope < flipped]
     if not bad:
         return None
     runs = []
@@ -159,7 +155,8 @@ def _flipped(recordings: RecordingSet, setup: PreparedInstrument):
 
 def _nearest(slope: float, units: dict[str, float]) -> str | None:
     """The unit whose factor a slope is near; None if it is near to none."""
-    return next((name for name, factor in units.items() if abs(slope / factor - 1) < _NEAR_UNIT), None)
+    near_unit = 0.12  # Relative distance of a slope to a unit's factor within which it is that unit.
+    return next((name for name, factor in units.items() if abs(slope / factor - 1) < near_unit), None)
 
 
 def _other_unit(recordings: RecordingSet, setup: PreparedInstrument):
@@ -211,7 +208,8 @@ def _wrong_rotors(recordings: RecordingSet, setup: PreparedInstrument):
 
     energy = {order: energy_of(order) for order in permutations(stated)}
     best = min(energy, key=energy.get)
-    if best != stated and energy[best] * _BETTER < energy[stated]:
+    better = 4.0  # Residual energy over the stated order's, below which another order of rotors is the true one.
+    if best != stated and energy[best] * better < energy[stated]:
         moved = [i + 1 for i in stated if best[i] != i]
         text = f"the columns of rotors {', '.join(map(str, moved))} are exchanged; they were put in order"
         names = c.rotor_columns("rotor_speed", vehicle.rotor_count)

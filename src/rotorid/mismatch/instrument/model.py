@@ -48,15 +48,8 @@ OFFSET = "offset:load-reading"
 _AtWork = Sequence[tuple[Form, np.ndarray]]
 """Forms with their parameter values."""
 _DISPLACED = ("velocity", "angular_velocity", "angular_acceleration", "specific_force", "accelerometer", "gyroscope")
-_MOST_BLOCKS = 150
-_LEAST_BLOCKS = 40
-_BLOCK_S = 2.0
 MEMORY = 4
 """Blocks over which the noise of a sensor may be alike beyond what whitening takes away: 1/f noise has no end."""
-_ROWS_PER_COLUMN = 8
-_STRONGEST = 0.9
-"""Quantile of the seconds' energies above which a contribution's size is taken: what shows only after a change of load
-is in few of them."""
 MOST_OFFSET = 2.0
 """Samples by which reading and load may lie apart before it is a finding. The derivative of a reading that lags by τ is
 what it lacks, divided by τ: an offset in time without end would be that filter itself."""
@@ -190,11 +183,6 @@ def chosen_already(model: ReadingModel) -> Chosen:
     return chosen_at(regression_of(model.setup, model.rows, model.terms, taps, by_channel=True), model.selection.active)
 
 
-def everything(run: str, time_s: float) -> bool:
-    """Every block is fitted: what is held out is not here."""
-    return True
-
-
 def regression_of(
     setup: PreparedInstrument,
     rows: list[Rows],
@@ -205,19 +193,22 @@ def regression_of(
 ) -> Regression:
     """The regression of a reading's rows; `filters`, `noisy` and `by_channel` as in `regression.build`."""
     block_s = block_length(setup, rows) / setup.rate_hz
-    out = build(rows, terms, filters, everything, block_s, setup.rate_hz, noisy, by_channel=by_channel)
+    out = build(rows, terms, filters, None, block_s, setup.rate_hz, noisy, by_channel=by_channel)
     restrain(out, setup)
     return out
 
 
 def block_length(setup: PreparedInstrument, rows: list[Rows]) -> int:
-    """Rows of a block: short stretches whole, else about BLOCK_S, within bounds on their number."""
+    """Rows of a block: short stretches whole, else about `block_s`, within bounds on their number."""
     typical = float(np.median([len(r.y) for r in rows]))
     total = sum(len(r.y) for r in rows)
+    least_blocks = 40
     if typical < SHORT:
-        return max(2, int(typical)) if len(rows) >= 12 else max(2, total // _LEAST_BLOCKS)
-    wanted = _BLOCK_S * setup.rate_hz
-    return int(np.clip(wanted, max(total / _MOST_BLOCKS, 5), max(total / _LEAST_BLOCKS, 5)))
+        return max(2, int(typical)) if len(rows) >= 12 else max(2, total // least_blocks)
+    block_s = 2.0
+    wanted = block_s * setup.rate_hz
+    most_blocks = 150
+    return int(np.clip(wanted, max(total / most_blocks, 5), max(total / least_blocks, 5)))
 
 
 def _noise_and_filters(
@@ -226,7 +217,8 @@ def _noise_and_filters(
     """Noise by channel (6,) and whitening filters, from what the whole catalogue leaves."""
     total = sum(len(r.y) for r in rows)
     size = rows[0].x.shape[2]
-    kept = _modest(terms, total // _ROWS_PER_COLUMN) if size > total // _ROWS_PER_COLUMN else np.arange(size)
+    rows_per_column = 8
+    kept = _modest(terms, total // rows_per_column) if size > total // rows_per_column else np.arange(size)
     precision = np.concatenate([1.0 / np.square(np.asarray(t.prior_sd, float)) for t in terms])
     thin = [Rows(r.run, r.time_s, r.y, r.x[:, :, kept]) for r in rows]
     left, _ = full_fit_residuals(thin, precision[kept])
@@ -313,6 +305,10 @@ def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int):
     """Size of columns with coefficients: rms over the strongest tenth of the seconds, in units of the noise, (6,)."""
     unit_noise = np.where(np.isfinite(noise), noise, np.inf)
 
+    # Quantile of the seconds' energies above which a contribution's size is taken: what shows only after a change of
+    # load is in few of them.
+    strongest = 0.9
+
     def sizes(cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
         energies = []
         for r in rows:
@@ -321,7 +317,7 @@ def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int):
             whole = len(square) // count * count
             energies.append(square[:whole].reshape(count, -1, 6).mean(axis=1))
         every = np.sort(np.concatenate(energies), axis=0)
-        return np.sqrt(every[int(_STRONGEST * len(every)) :].mean(axis=0)) / unit_noise
+        return np.sqrt(every[int(strongest * len(every)) :].mean(axis=0)) / unit_noise
 
     return sizes
 

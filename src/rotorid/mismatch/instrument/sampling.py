@@ -31,21 +31,12 @@ from rotorid.recordings.held import step_of, usual_change
 
 WIDTHS = (5, 9, 17, 33, 65, 129, 257)
 """Samples of the windows."""
-_LEAST_STEPS = 4
 _CALM_S, _LOOK_S = 0.8, 3.0
 """Time before and after a step without another, and time after it that is looked at."""
-_BY_HAND, _SETTLED = 1.5, 1.35
-"""Scatter relative to the later scatter, in the first moments, from which loads count as put on by hand, and from which
-a reading has not settled."""
 _SMOOTH = 5
 """Samples over which the scatter is smoothed."""
 _SLACK_S = 0.1
 """Time left out before a step, and after the readings have settled."""
-_LEAST_SAMPLES = 200
-_HELD_SHARE = 0.3
-"""Share of readings that repeat the one before, from which a column is held between readings."""
-_LEAST_CHANGES, _SMALL_CHANGES = 20, 0.05
-"""How often it changes at least, and the median of its changes as a share of its range: other steps are the load's."""
 
 
 def without_repeats(recordings: RecordingSet) -> RecordingSet:
@@ -62,8 +53,11 @@ def without_repeats(recordings: RecordingSet) -> RecordingSet:
 
 def _is_held(values: np.ndarray, steps: np.ndarray) -> bool:
     """Whether a column (n,) with these steps from row to row is held, on no grid, and most of its changes are noise."""
-    often = (steps == 0).mean() > _HELD_SHARE and (steps != 0).sum() >= _LEAST_CHANGES
-    return bool(often) and not step_of(values) and usual_change(values) < _SMALL_CHANGES
+    held_share = 0.3  # Share of readings that repeat the one before, from which a column is held between readings.
+    # How often it changes at least, and the median of its changes as a share of its range: other steps are the load's.
+    least_changes, small_changes = 20, 0.05
+    often = (steps == 0).mean() > held_share and (steps != 0).sum() >= least_changes
+    return bool(often) and not step_of(values) and usual_change(values) < small_changes
 
 
 def quantisation(setup, noise: np.ndarray) -> tuple[Finding | None, str | None]:
@@ -72,7 +66,8 @@ def quantisation(setup, noise: np.ndarray) -> tuple[Finding | None, str | None]:
     effect = catalogue()["quantisation"]
     names = columns.FORCE + columns.MOMENT
     total = sum(len(r.table) for r in setup.recordings.runs)
-    if total < _LEAST_SAMPLES:
+    least_samples = 200
+    if total < least_samples:
         return None, "too few samples to see the steps of the reading"
     found = []
     for k in setup.instrument.channels:
@@ -134,7 +129,8 @@ def _scatter(loadings: Sequence[Loading], channel: int, largest: float, dt_s: fl
             jumps.append(x.load[start, channel] - x.load[start - 1, channel])
             settled = np.median(x.reading[start + (stop - start) // 2 : stop, channel])
             shapes.append((part - settled) / jumps[-1])
-    if len(shapes) < _LEAST_STEPS:
+    least_steps = 4
+    if len(shapes) < least_steps:
         return None
     normal = np.array([s[: min(map(len, shapes))] for s in shapes])
     usual = np.median(normal, axis=0)
@@ -144,6 +140,9 @@ def _scatter(loadings: Sequence[Loading], channel: int, largest: float, dt_s: fl
 def settling_s(loadings: Sequence[Loading], channels, largest, dt_s: float) -> float:
     """How long after a step the stated load cannot be relied on, s; 0 where it can."""
     longest = 0.0
+    # Scatter relative to the later scatter, in the first moments, from which loads count as put on by hand, and from
+    # which a reading has not settled.
+    by_hand, settled = 1.5, 1.35
     for c in channels:
         spread = _scatter(loadings, c, largest[c], dt_s)
         if spread is None:
@@ -151,9 +150,9 @@ def settling_s(loadings: Sequence[Loading], channels, largest, dt_s: float) -> f
         smooth = np.sqrt(np.convolve(spread**2, np.ones(_SMOOTH) / _SMOOTH, mode="same"))
         late = float(np.median(spread[2 * len(spread) // 3 :]))
         early = float(np.sqrt(np.mean(spread[: max(3, int(_CALM_S / dt_s))] ** 2)))
-        if early < _BY_HAND * late:
+        if early < by_hand * late:
             continue
-        above = np.flatnonzero(smooth[:-_SMOOTH] > _SETTLED * late)
+        above = np.flatnonzero(smooth[:-_SMOOTH] > settled * late)
         longest = max(longest, (above[-1] + 1) * dt_s + _SLACK_S if len(above) else 0.0)
     return longest
 

@@ -26,11 +26,6 @@ from rotorid.recordings.sufficient import compared_readings, driven_by
 
 _GAP_STEPS = 4.0
 """Where readings are missing for longer than this many median steps they are not compared."""
-_STRAIGHT, _CURVED = 0.02, 12.0
-"""Change of a column's slope from one reading to the next, as a share of its range, and in the lower quartile of such
-changes, up to which it is straight between the two."""
-_LOAD_BENDS = 0.05
-"""What a load, which is no noise, may bend by at most, as a share of its largest value."""
 _SHORTEST = 4
 _NO_ROWS = f"{{}}: no run has {_SHORTEST} samples in a row with every channel"
 SHORT = 60
@@ -213,8 +208,12 @@ def _straight(time_s: np.ndarray, known_s: np.ndarray, values: np.ndarray, load:
     if len(known_s) < 3:
         return np.isin(time_s, known_s)
     bends = np.abs(np.diff(values, 2, prepend=values[0], append=values[-1]))
-    least = max(_STRAIGHT * float(np.ptp(values)), _CURVED * float(np.quantile(bends, 0.25)))
-    least = min(least, _LOAD_BENDS * float(np.abs(values).max())) if load else least
+    # Change of a column's slope from one reading to the next, as a share of its range, and in the lower quartile of
+    # such changes, up to which it is straight between the two.
+    straight, curved = 0.02, 12.0
+    least = max(straight * float(np.ptp(values)), curved * float(np.quantile(bends, 0.25)))
+    load_bends = 0.05  # What a load, which is no noise, may bend by at most, as a share of its largest value.
+    least = min(least, load_bends * float(np.abs(values).max())) if load else least
     after = np.searchsorted(known_s, time_s).clip(1, len(known_s) - 1)
     off_s = np.minimum(np.abs(time_s - known_s[after - 1]), np.abs(known_s[after] - time_s))
     bent = np.minimum(bends[after - 1], bends[after]) > least

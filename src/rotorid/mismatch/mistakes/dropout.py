@@ -34,10 +34,6 @@ from rotorid.recordings.sufficient import (
     whole_stretches,
 )
 
-_LARGEST_UNTOUCHED_SHARE = 0.5
-_LEAST_OF_A_SIDE = 0.5
-"""Share of the fitted or held-out part of a single run in which every sensor must have readings."""
-
 
 @dataclass(frozen=True)
 class _Dropout:
@@ -108,7 +104,9 @@ def what_is_left(recordings: RecordingSet, before: RecordingSet, lost: Finding) 
         (run,) = recordings.runs
         found, _ = whole_stretches(run, sensors[run.name])
         sides = parts_of(recordings, split_runs(recordings))
-        if all(_share(part, found) > _LEAST_OF_A_SIDE for side in sides for part in side.runs):
+        # Share of the fitted or held-out part of a single run in which every sensor must have readings.
+        least_of_a_side = 0.5
+        if all(_share(part, found) > least_of_a_side for side in sides for part in side.runs):
             return recordings, ()
         start, stop = max(found, key=lambda s: s[1] - s[0], default=(0.0, 0.0))
         if stop - start >= LEAST_SINGLE_S:
@@ -286,6 +284,7 @@ def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[
         return out
     usual = np.where(np.isfinite(usual), usual, np.nanmedian(usual))
     top = float(np.median(usual))
+    largest_untouched_share = 0.5
     for i, name in enumerate(names):
         others = np.delete(speed / usual, i, axis=1)
         # Half of the others at work, and none of them standing: then the vehicle flies.
@@ -312,7 +311,7 @@ def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[
         if sudden.any():
             # Readings strewn between zeros are no better than the zeros.
             share = sudden[flying].mean()
-            out[name] = np.isfinite(speed[:, i]) if share > _LARGEST_UNTOUCHED_SHARE else sudden
+            out[name] = np.isfinite(speed[:, i]) if share > largest_untouched_share else sudden
     return out
 
 

@@ -34,24 +34,16 @@ BANDS_HZ = {
 }
 """Of each comparison the frequencies that are looked at."""
 BLOCK_S = 2.56
-_OVERSAMPLING = 5.0
-"""Rate of the thinned signals over the cutoff."""
 _SMOOTHED = 5
 """Neighbouring frequencies over which powers are averaged."""
 OVERLAP = 1.94
 """Neighbouring frequencies of a Hann window are correlated: sums of squares vary by this more."""
 FEWEST_BLOCKS = 4
-_PIECE_BINS = 6
-"""Frequencies of a block that count as one piece: with Hann's window only next neighbours are correlated, so that the
-pieces of a block are nearly independent. Short flights have too few blocks to be judged by: what stands at eight
-standard errors is no chance, and yet 1 in 20,000 by Student's t of eight blocks."""
 LONGEST_LAG_S = 0.15
 CAUSES_S = np.arange(0.0, LONGEST_LAG_S + 1e-9, 0.005)
 """How much later than its cause a motion may be."""
 _MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
 _DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
-_UNDECIDED = 12.0
-"""Motor lags within this log-likelihood are not distinguished."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +105,9 @@ def cut(
     """
     cutoff = band_hz[1]
     good = np.all([np.isfinite(values).all(axis=1) for values in sides], axis=0)
+    oversampling = 5.0  # Rate of the thinned signals over the cutoff.
     # Analysis above the band is thinned away; all runs must share one grid of frequencies.
-    step = max(1, int(rate_hz / (_OVERSAMPLING * cutoff)))
+    step = max(1, int(rate_hz / (oversampling * cutoff)))
     length = int(round(BLOCK_S * rate_hz / step))
     frequency = np.arange(1, int(np.ceil(band_hz[1] * BLOCK_S)) + 1) / BLOCK_S
     used = np.flatnonzero((frequency >= band_hz[0]) & (frequency <= band_hz[1]))
@@ -289,7 +282,11 @@ def fit(blocks: Blocks | None, lags_s: np.ndarray | None = None) -> LaggedFit | 
 
 def pieces(frequency_hz: np.ndarray) -> list[np.ndarray]:
     """Places of the frequencies that make a piece each."""
-    return np.array_split(np.arange(frequency_hz.size), max(1, frequency_hz.size // _PIECE_BINS))
+    # Frequencies of a block that count as one piece: with Hann's window only next neighbours are correlated, so that
+    # the pieces of a block are nearly independent. Short flights have too few blocks to be judged by: what stands at
+    # eight standard errors is no chance, and yet 1 in 20,000 by Student's t of eight blocks.
+    piece_bins = 6
+    return np.array_split(np.arange(frequency_hz.size), max(1, frequency_hz.size // piece_bins))
 
 
 def beyond_nuisances(turn: np.ndarray, z: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -344,8 +341,9 @@ def through_motor(blocks: Blocks) -> tuple[float, Blocks]:
         for factor in (1 - width, 1 - width / 2, 1 + width / 2, 1 + width):
             attempt(best * factor)
     best = min(trials, key=lambda tau: trials[tau][0])
+    undecided = 12.0  # Motor lags within this log-likelihood are not distinguished.
     # Slow motion cannot distinguish a lag from a dead time: where it fits as well with hardly any, there is none.
-    plausible = [tau for tau in trials if trials[tau][0] < trials[best][0] + _UNDECIDED]
+    plausible = [tau for tau in trials if trials[tau][0] < trials[best][0] + undecided]
     least = min(plausible, key=lambda tau: trials[tau][1])
     chosen = least if trials[least][1] < 0.5 * trials[best][1] else best
     return chosen, trials[chosen][2]

@@ -31,19 +31,9 @@ from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, Signals, estab
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings.run import Doubt
 
-_MOST_ROTORS_FOR_EVERY_ORDER = 6
-_LEAST_LIKELIHOOD = 25.0
-"""Log-likelihood that the right layout must bring over none, and over the believed one."""
 _LEAST_STEP = 0.6
-_P_LIMIT = 1e-6
-_P_HELD_OUT = 0.01
-"""Chance of a layout on the runs held out alone, its gains from the others."""
 _STEP_S, _PAST_STEPS = 0.016, 12
 """Length of the intervals over which rates and torques are averaged, and how many of them foretell the next rate."""
-_MOTORS_S = (0.0, 0.02, 0.05, 0.1)
-_LEAST_FORETOLD, _LEAST_FORETOLD_IN_PART = 3.5, 0.5
-"""Standard errors by which past torques must improve what past rates foretell: in all runs; in those held out, and in
-the others."""
 _LATER_S = np.arange(0.005, 0.1001, 0.005)
 """By how much longer the torque of rotors may lag behind their commands than the delay that roll shows."""
 
@@ -143,7 +133,8 @@ def _losses_of_orders(m: list[_Moments], rows: np.ndarray, orders: np.ndarray) -
 
 def _orders_to_try(count: int) -> np.ndarray:
     """Orders of the columns: every one for few rotors, else every exchange of two; the believed one first."""
-    if count <= _MOST_ROTORS_FOR_EVERY_ORDER:
+    most_rotors_for_every_order = 6
+    if count <= most_rotors_for_every_order:
         return np.array(list(permutations(range(count))))
     exchanges = np.tile(np.arange(count), (1 + count * (count - 1) // 2, 1))
     for order, (i, j) in zip(exchanges[1:], combinations(range(count), 2), strict=True):
@@ -238,16 +229,18 @@ def find(recordings: ReadSet, by_yaw: bool = True) -> Corrected:
     step, p_value = _contest(seen, now, then)
     p_value = min(1.0, p_value * losses.size)
     disputed = float(sum(m.square.sum() for m in seen))
-    likely = (as_believed - best) / lagged.OVERLAP > _LEAST_LIKELIHOOD
+    least_likelihood = 25.0  # Log-likelihood that the right layout must bring over none, and over the believed one.
+    likely = (as_believed - best) / lagged.OVERLAP > least_likelihood
     explains = disputed - best > least_advantage * (disputed - as_believed)
-    if not (likely and explains and step > _LEAST_STEP and p_value < _P_LIMIT):
+    p_limit = 1e-6
+    if not (likely and explains and step > _LEAST_STEP and p_value < p_limit):
         return Corrected(recordings)
     if order:
         # What the believed order leaves of roll and pitch where the torque may come after the motion.
         early = lagged.fit(blocks, -lagged.CAUSES_S[::-1])
         moments = [_moments(blocks, axis, early.lag_s, free.weight[axis]) for axis in (0, 1)]
         left = sum(_loss(m, _best_gain(m, row)) for m, row in zip(moments, rows, strict=True))
-        if left < least - yaw_losses.min() - lagged.OVERLAP * _LEAST_LIKELIHOOD:
+        if left < least - yaw_losses.min() - lagged.OVERLAP * least_likelihood:
             # The believed order, with stamps of the rotors that are late: `timing` finds them.
             return Corrected(recordings)
     held_out = _held_out(recordings, blocks)
@@ -403,7 +396,8 @@ def _holds(contested: list, held_out: Callable[[int, float], bool]) -> bool:
         now.append(believed(fitted))
         then.append(other(fitted))
     step, p_value = _contest(seen, now, then)
-    return step > _LEAST_STEP and p_value < _P_HELD_OUT
+    p_held_out = 0.01  # Chance of a layout on the runs held out alone, its gains from the others.
+    return step > _LEAST_STEP and p_value < p_held_out
 
 
 def _foretells(
@@ -434,14 +428,17 @@ def _foretells(
         scores = gain / np.sqrt(left / square)
         return float(scores[np.argmax(np.abs(scores))])
 
-    parts = ((out | True, _LEAST_FORETOLD), (out, _LEAST_FORETOLD_IN_PART), (~out, _LEAST_FORETOLD_IN_PART))
+    # Standard errors by which past torques must improve what past rates foretell: in all runs; in those held out, and
+    # in the others.
+    least_foretold, least_foretold_in_part = 3.5, 0.5
+    parts = ((out | True, least_foretold), (out, least_foretold_in_part), (~out, least_foretold_in_part))
     if min(out.sum(), (~out).sum()) < 3 * past.shape[1]:
         parts = parts[:1]
     return all(added(chosen, other) > max(least, added(chosen, believed)) for chosen, least in parts)
 
 
 def _past_and_next(signals: Signals, vehicle: Vehicle, sensor: str):
-    """Of each interval of a run its time (n,), yaw rate (n,), rates before it (n, 36), and what motors of _MOTORS_S
+    """Of each interval of a run its time (n,), yaw rate (n,), rates before it (n, 36), and what motors of `motors_s`
     have made of each rotor's torque before it, (n, motors, k); None for none.
 
     Intervals do not overlap, so that nothing of the next one is in those before.
@@ -456,13 +453,14 @@ def _past_and_next(signals: Signals, vehicle: Vehicle, sensor: str):
         [signals.values["gyroscope"], lagged.squared_speeds(signals, vehicle, sensor) * torque], axis=1
     )
     parts = []
+    motors_s = (0.0, 0.02, 0.05, 0.1)
     for start, stop in stretches(np.isfinite(both).all(axis=1)):
         count = (stop - start) // length
         if count < 3 * _PAST_STEPS:
             continue
         mean = both[start : start + count * length].reshape(count, length, -1).mean(axis=1)
         mean -= mean.mean(axis=0)
-        keep = [np.exp(-step_s / motor_s) if motor_s else 0.0 for motor_s in _MOTORS_S]
+        keep = [np.exp(-step_s / motor_s) if motor_s else 0.0 for motor_s in motors_s]
         made = np.stack([lfilter([0.0, 1.0 - a], [1.0, -a], mean[:, 3:], axis=0) for a in keep], axis=1)
         past = np.concatenate([mean[_PAST_STEPS - k : count - k, :3] for k in range(1, _PAST_STEPS + 1)], axis=1)
         time_s = (start + (np.arange(_PAST_STEPS, count) + 0.5) * length) / signals.rate_hz

@@ -37,26 +37,15 @@ _P_LIMIT, _P_LATE = 1e-6, 1e-4
 """Chance of a growth of lateness, and of a constant one beyond a sample; both have to bring LEAST_LIKELIHOOD too."""
 _LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
-_SURE_SIGMAS = 3.0
-"""Standard errors that a constant lateness has when it is measured once more, the other sensors corrected."""
-_FILTER_SAMPLES, _FILTER_S = 2.6, 0.008
-"""One inertial sensor, or the commands, alone off by less than both is a filter or a controller, not a logger."""
 _SMALL_LAGS = {
     "gyroscope": "as its built-in filter makes it; shifted, not counted as a finding",
     "accelerometer": "as its built-in filter makes it; shifted, not counted as a finding",
     "commands": "as motor controllers take; left as part of the motors' lag",
     "throttle": "as motor controllers take; left as part of the motors' lag",
 }
-_RUN_AGREEMENT, _RUN_SIGMAS = 0.1, 3.0
-"""Share of a drift, and one-sigmas of its own, that a run's drift may be off all runs'."""
 _LARGEST_SKEW = 1.2e-2
-_LONGEST_DRIFT_S = 0.4
-_COARSE_SKEWS = 6
 _COARSE_LAGS_S = np.arange(-0.12, 0.121, 0.01)
 _LAG_STEP_S = 0.001
-_LATE_FLOOR_S = 2e-5
-_BAND_STEP, _LEAST_BAND = 1.5, 5.0
-"""Ratio of the bands that are tried, and of the narrowest's ends (0.4 to 2 Hz)."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +187,8 @@ def one_quantity(blocks: lagged.Blocks, own: Sequence[int]) -> lagged.Blocks | N
     # Gain at the lowest frequencies that may be a sensor's scale (a filter's velocity of a fast flight: 1.15).
     scales = (0.85, 1.25)
     lowest, top = blocks.frequency_hz[0], blocks.frequency_hz[-1]
-    tops = top / _BAND_STEP ** np.arange(1 + int(np.log(top / (_LEAST_BAND * lowest)) / np.log(_BAND_STEP)))
+    band_step, least_band = 1.5, 5.0  # Ratio of the bands that are tried, and of the narrowest's ends (0.4 to 2 Hz).
+    tops = top / band_step ** np.arange(1 + int(np.log(top / (least_band * lowest)) / np.log(band_step)))
     bands = [b for b in (blocks.up_to(f) for f in tops) if b.frequency_hz.size > 1]
     gains = []
     for band in bands:
@@ -246,7 +236,8 @@ def _difference(of: _SensorPair, drifting: bool, free: bool = True) -> _Lateness
     first fit.
     """
     blocks, found = of.blocks, of.fit
-    longest = _LONGEST_DRIFT_S if drifting else lagged.LONGEST_LAG_S
+    longest_drift_s = 0.4
+    longest = longest_drift_s if drifting else lagged.LONGEST_LAG_S
     lags = np.arange(-longest, longest + 1e-9, _LAG_STEP_S)
     # Only the fast comparisons with the gyroscope blur beyond recognition.
     if free and drifting and np.min(found.explained) < _LEAST_EXPLAINED and "gyroscope" in (of.late, of.over):
@@ -279,7 +270,8 @@ def _difference(of: _SensorPair, drifting: bool, free: bool = True) -> _Lateness
     size = design.shape[1]
     # The likelihood's own curvature counts as a floor.
     covariance[:size, :size] = robust if np.trace(robust) > np.trace(inverse) else inverse
-    covariance[0, 0] += _LATE_FLOOR_S**2
+    late_floor_s = 2e-5
+    covariance[0, 0] += late_floor_s**2
     unmoved = blocks.y - blocks.x @ found.gain.T - blocks.z @ found.nuisance.T
     rise = float(np.sum(weight * (np.abs(unmoved) ** 2 - np.abs(left) ** 2)))
     gained = 0.0
@@ -311,7 +303,8 @@ def _unblurred(blocks: lagged.Blocks, found: lagged.LaggedFit) -> lagged.LaggedF
     """The fit at the coarse growth that explains most, its delay that of the middle of the runs."""
     aside = blocks.time_s - blocks.time_s.mean()
     best = found
-    for rate in np.arange(-_COARSE_SKEWS, _COARSE_SKEWS + 1) * _LARGEST_SKEW / _COARSE_SKEWS:
+    coarse_skews = 6
+    for rate in np.arange(-coarse_skews, coarse_skews + 1) * _LARGEST_SKEW / coarse_skews:
         trial = lagged.fit(blocks.delayed(rate * aside), _COARSE_LAGS_S)
         if np.min(trial.explained) > np.min(best.explained):
             best = trial
@@ -378,6 +371,8 @@ def _in_every_run(whole: _LatenessFound) -> bool:
     """Whether each run by itself shows the growth: what acts in part of a flight only must not pass for a clock."""
     blocks = whole.of.blocks
     agree, shown = [], []
+    # Share of a drift, and one-sigmas of its own, that a run's drift may be off all runs'.
+    run_agreement, run_sigmas = 0.1, 3.0
     for run in np.unique(blocks.run):
         own = blocks.part(blocks.run == run)
         if own.count < 2:
@@ -385,7 +380,7 @@ def _in_every_run(whole: _LatenessFound) -> bool:
         # A run of a few blocks cannot determine gains of its own.
         d = _difference(replace(whole.of, blocks=own), drifting=True, free=own.count >= lagged.FEWEST_BLOCKS)
         sd = d.sd(1)
-        agree.append(abs(d.growth - whole.growth) < _RUN_SIGMAS * sd + _RUN_AGREEMENT * abs(whole.growth))
+        agree.append(abs(d.growth - whole.growth) < run_sigmas * sd + run_agreement * abs(whole.growth))
         due = min(_LEAST_LIKELIHOOD, whole.gained * own.count / blocks.count) / 4
         shown.append(d.growth * whole.growth > 0 and abs(d.growth) > 2 * sd and d.gained > due)
     return bool(agree) and all(agree) and np.mean(shown) >= 0.6
@@ -640,7 +635,9 @@ def _delay(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
         return Corrected(recordings)
     solved = _lateness(found, 0)
     sample = max(1.0 / s.rate_hz for s in signals)
-    small = min(_FILTER_S, _FILTER_SAMPLES * sample)
+    # One inertial sensor, or the commands, alone off by less than both is a filter or a controller, not a logger.
+    filter_samples, filter_s = 2.6, 0.008
+    small = min(filter_s, filter_samples * sample)
     relative = _relative_to_most(solved, periods, 2.0, small)
     late = {n: value for n, (value, _, _) in relative.items()}
     tolerance = {n: max(periods[n], 3 * sd) for n, (_, sd, _) in relative.items()}
@@ -668,6 +665,8 @@ def _delay(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
         if sensor in _INERTIAL:
             fixed = _shifted(fixed, [sensor], late[sensor])
     unfiltered = fixed
+    # Standard errors that a constant lateness has when it is measured once more, the other sensors corrected.
+    sure_sigmas = 3.0
     for cluster in clusters:
         if cluster[0] in own:
             continue
@@ -677,7 +676,7 @@ def _delay(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
         nearly = _shifted(unfiltered, _with_position(cluster), steps)
         amount, sd = _remeasured(nearly, cluster, 0, steps, others) or (amount, sd)
         # Measured once more it may be less sure: the status agrees with the stated interval.
-        if abs(amount) < max(_SURE_SIGMAS * sd, min(limits[n] for n in cluster)):
+        if abs(amount) < max(sure_sigmas * sd, min(limits[n] for n in cluster)):
             notes.append(
                 f"{capital(_listed(cluster))}: {1e3 * amount:+.1f} ms against the rest, "
                 f"give or take {1e3 * 1.96 * sd:.1f} ms: not surely a sample or more."

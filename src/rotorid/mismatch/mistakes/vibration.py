@@ -19,12 +19,9 @@ from rotorid.mismatch.evidence.motion import full_speed
 from rotorid.mismatch.mistakes.signals import P_LIMIT, Corrected, ReadSet, Signals, established
 from rotorid.recordings import columns as c
 
-_WINDOW_S = 0.35
 _SIDE_BINS = (-6, -5, -4, -3, 3, 4, 5, 6)
 """Offsets from the order, in widths of the window, that give the level next to the line."""
 _ORDERS = (1, 2)
-_LEAST_MEDIAN = 3.0
-"""Power at the order over that next to it in half of the windows, at least."""
 _SCALES = np.arange(0.85, 1.151, 0.015)
 """Factors on a commanded speed that are tried: the window distinguishes speeds of 18 rad/s."""
 
@@ -144,7 +141,8 @@ def _measure(all_seen: list[tuple[np.ndarray, _Turns | None]], column: str, unit
         return None
     ratio, power, level, length = (np.concatenate(x) for x in (ratios, powers, levels, lengths))
     n = len(ratio)
-    if np.median(ratio) < _LEAST_MEDIAN:
+    least_median = 3.0  # Power at the order over that next to it in half of the windows, at least.
+    if np.median(ratio) < least_median:
         return None  # a line is there as long as the rotors turn; single fierce moments are motion
     # Each ratio is about exponential, a little heavier because the level nearby is estimated from eight bins.
     p = float(gamma.sf(float(ratio.sum()) * (1 - 1 / len(_SIDE_BINS)), n))
@@ -167,7 +165,8 @@ def _tapered(length: int) -> np.ndarray:
 def _turns(s: Signals, order: int, most: int) -> _Turns | None:
     """The rotors of a run at an order, in no more than `most` windows spread over it; None of too few samples."""
     lowest_hz = 8.0  # Aliases below this fall among the flight's own motion and are left out.
-    length, speed, dt = int(_WINDOW_S * s.rate_hz), s.values["rotors"], 1.0 / s.rate_hz
+    window_s = 0.35
+    length, speed, dt = int(window_s * s.rate_hz), s.values["rotors"], 1.0 / s.rate_hz
     if length < 24:
         return None
     count = len(s.time_s) // length
@@ -179,7 +178,7 @@ def _turns(s: Signals, order: int, most: int) -> _Turns | None:
     steps[:, 0] = 0.0
     follow = np.exp(-1j * np.cumsum(steps, axis=1))
     turned = np.abs((order * speed.mean(axis=1) * dt + np.pi) % (2 * np.pi) - np.pi)
-    clear = turned / (2 * np.pi * dt) > lowest_hz + 6 / _WINDOW_S
+    clear = turned / (2 * np.pi * dt) > lowest_hz + 6 / window_s
     # Rotors of nearly one speed add to each other's line, with phases that wander: their powers add.
     together = np.matmul((_tapered(length)[:, None] * follow.conj()).transpose(0, 2, 1), follow) / length
     return _Turns(windows, length, follow, clear, np.sum(np.abs(together) ** 2, axis=2))

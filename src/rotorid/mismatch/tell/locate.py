@@ -37,27 +37,11 @@ from rotorid.mismatch.mistakes.signals import channel_of
 from rotorid.mismatch.tell.verdict import Location, Regime
 from rotorid.recordings.signal.kernels import causal
 
-_ON_SHARE_OF_PEAK = 0.2
-_ON_SHARE_OF_NOISE = 0.15
-_LOST_AT_ENDS_S = 1.0
-_SMALLEST_SHARE = 0.03
-"""Share of a run's mismatch energy below which an interval is not worth a line."""
-_SHORTEST_GAP_S = 0.25
-_LONGEST_GAP_S = 2.0
-_THROUGHOUT = 0.7
-"""Covering more than this share of the flight counts as being there throughout."""
 _CONFINED = 0.4
 """Being at work for less than this share of the flight counts as acting in part of it."""
-_AT_WORK = 0.03
-"""Local size relative to its peak above which a contribution is at work: drag is small when slow, ground effect nil."""
-_SCAN_S = (0.5, 1.0, 2.0, 4.0)
-_LARGER = 4.0
-"""Energy of a window over the usual, below which noise of higher variance is not called a mismatch."""
 _SHIFTED = 0.4
 """Mean of a window relative to the residual's usual size, below which a shift does not matter."""
 REGIME_BLOCK_S = 0.5
-_REGIME_BINS = 8
-_REGIME_P = 1e-3
 _EITHER_SIGN = 0.1
 """Share of the flight that a variable must be on the rarer side of zero for its magnitude to be tried."""
 
@@ -114,7 +98,8 @@ def _energy_share(signal: np.ndarray, part: slice) -> float:
 def _edge(analysis: Analysis, interval: _Interval, sample: int, end: int) -> float:
     """Time of an interval's edge; at a trace's end that of the run, of which filtering cost a moment."""
     time_s, run_s = interval.trace.time_s, analysis.recordings.run(interval.trace.run).time_s
-    if time_s[sample] == time_s[end] and abs(run_s[end] - time_s[end]) < _LOST_AT_ENDS_S:
+    lost_at_ends_s = 1.0
+    if time_s[sample] == time_s[end] and abs(run_s[end] - time_s[end]) < lost_at_ends_s:
         return float(run_s[end])
     return float(time_s[sample])
 
@@ -203,9 +188,11 @@ def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[_Inter
 def _share_at_work(contributions: Mapping[str, tuple[Sequence[ChannelTrace], Sequence[np.ndarray]]]) -> float:
     """Share of the flight in which a cause's contribution to any channel (traces and their series) is more than nil."""
     by_run: dict[tuple[str, float], list[np.ndarray]] = {}
+    # Local size relative to its peak above which a contribution is at work: drag is small when slow, ground effect nil.
+    at_work = 0.03
     for traces, series in contributions.values():
         levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
-        nil = _AT_WORK * float(np.quantile(np.concatenate(levels), 0.99))
+        nil = at_work * float(np.quantile(np.concatenate(levels), 0.99))
         for trace, level in zip(traces, levels, strict=True):
             by_run.setdefault((trace.run, float(trace.time_s[0])), []).append(level > nil)
     return float(np.concatenate([np.any(m, axis=0) for m in by_run.values()]).mean())
@@ -219,9 +206,12 @@ def _acting(traces: Sequence[ChannelTrace], series: Sequence[np.ndarray]) -> lis
     peak = float(np.quantile(np.concatenate(levels), 0.99))
     if not peak > matters * noise:
         return None
-    threshold = max(_ON_SHARE_OF_PEAK * peak, _ON_SHARE_OF_NOISE * noise)
+    on_share_of_peak = 0.2
+    on_share_of_noise = 0.15
+    threshold = max(on_share_of_peak * peak, on_share_of_noise * noise)
     masks = [_closed(level > threshold, _period(t)) for level, t in zip(levels, traces, strict=True)]
-    if np.concatenate(masks).mean() > _THROUGHOUT:
+    throughout = 0.7  # Covering more than this share of the flight counts as being there throughout.
+    if np.concatenate(masks).mean() > throughout:
         return [np.ones(len(m), bool) for m in masks]
     return masks
 
@@ -231,9 +221,10 @@ def _tested(traces: Sequence[ChannelTrace], masks: Sequence[np.ndarray], count: 
     family_error = 0.002  # Chance of any false interval in a whole set.
     noise, freedom = _channel_noise(traces), _freedom_per_sample(traces)
     found = []
+    smallest_share = 0.03  # Share of a run's mismatch energy below which an interval is not worth a line.
     for trace, mask in zip(traces, masks, strict=True):
         energy = np.concatenate([[0.0], np.cumsum(np.nan_to_num(_mismatch_of(trace, True)) ** 2)])
-        spans = [(a, b) for a, b in stretches(mask) if energy[b] - energy[a] >= _SMALLEST_SHARE * energy[-1]]
+        spans = [(a, b) for a, b in stretches(mask) if energy[b] - energy[a] >= smallest_share * energy[-1]]
         for start, stop in spans:
             p = _energy_p(trace.before[start:stop], noise, freedom)
             if p < family_error / max(len(spans) * count, 1):
@@ -260,8 +251,10 @@ def _closed(mask: np.ndarray, period_s: float) -> np.ndarray:
     """The mask with gaps closed that are shorter than what surrounds them: a zero crossing is no end."""
     spans = stretches(mask)
     out = mask.copy()
+    shortest_gap_s = 0.25
+    longest_gap_s = 2.0
     for (a, b), (c, d) in zip(spans, spans[1:], strict=False):
-        allowed = min(max(_SHORTEST_GAP_S, min(b - a, d - c) * period_s), _LONGEST_GAP_S)
+        allowed = min(max(shortest_gap_s, min(b - a, d - c) * period_s), longest_gap_s)
         if (c - b) * period_s < allowed:
             out[b:c] = True
     return out
@@ -371,7 +364,8 @@ def _evened(traces: Sequence[ChannelTrace], white: list[np.ndarray], hard) -> li
 
 
 def _lengths(trace: ChannelTrace) -> list[int]:
-    return [n for s in _SCAN_S if 4 < (n := int(round(s / _period(trace)))) <= len(trace.named) // 2]
+    scan_s = (0.5, 1.0, 2.0, 4.0)
+    return [n for s in scan_s if 4 < (n := int(round(s / _period(trace)))) <= len(trace.named) // 2]
 
 
 def _window_starts(size: int, length: int) -> np.ndarray:
@@ -403,6 +397,7 @@ def _louder(traces, white, limit) -> list[_Interval]:
     """Windows with more energy than the spread of the windows' energies allows."""
     moves_s = 0.2  # Lags over which larger residuals may follow each other.
     hits = []
+    larger = 4.0  # Energy of a window over the usual, below which noise of higher variance is not called a mismatch.
     for length in _lengths(min(traces, key=lambda t: len(t.named))):
         means = [_window_sums(w**2, length) / length for w in white]
         pooled = np.concatenate(means)
@@ -411,7 +406,7 @@ def _louder(traces, white, limit) -> list[_Interval]:
         degrees = max(min(2 * (usual / spread) ** 2, float(length)), 1.0)
         for k, mean in enumerate(means):
             p = chi2.sf(degrees * mean / usual, degrees)
-            hits.append((k, length, p, (p < limit) & (mean > _LARGER * usual)))
+            hits.append((k, length, p, (p < limit) & (mean > larger * usual)))
     out = []
     for k, start, stop, p in _flagged(white, hits):
         trace, w = traces[k], white[k]
@@ -511,6 +506,7 @@ def _regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | No
     energy = by_block(np.nan_to_num(_mismatch_of(t, explained)) ** 2 for t in traces) / noise**2
     flown = [analysis.regimes.get(t.run, {}) for t in traces]
     names, scored = set.intersection(*map(set, flown)), []
+    regime_p = 1e-3
     for name in sorted(names):
         lines = [np.interp(t.time_s, r["time_s"], r[name]) for t, r in zip(traces, flown, strict=True)]
         value = by_block(lines)
@@ -519,7 +515,7 @@ def _regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | No
             tried.append((by_block(map(np.abs, lines)), True))
         for values, either_sign in tried:
             found = _separation(energy, values)
-            if found is not None and found[1] < _REGIME_P / len(names):
+            if found is not None and found[1] < regime_p / len(names):
                 share, _, low, high, held = found
                 weight = 0.5 if name == "time_s" else 1.0 / better_by_magnitude if either_sign else 1.0
                 scored.append((share * held * weight, name, low, high, either_sign))
@@ -539,7 +535,8 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     energy, value = energy[good], value[good]
     # A load turned into other axes is 1e-17 where it should be nothing: two bins of nothing, and no words for either.
     value = np.where(np.abs(value) < 1e-9 * np.abs(value).max(initial=0.0), 0.0, value)
-    edges = np.unique(np.quantile(value, np.linspace(0, 1, _REGIME_BINS + 1))) if len(value) else np.zeros(0)
+    regime_bins = 8
+    edges = np.unique(np.quantile(value, np.linspace(0, 1, regime_bins + 1))) if len(value) else np.zeros(0)
     if len(edges) < 3 or len(value) < 3 * len(edges):
         return None
     which = np.clip(np.searchsorted(edges, value, side="right") - 1, 0, len(edges) - 2)

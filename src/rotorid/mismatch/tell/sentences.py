@@ -34,14 +34,8 @@ if TYPE_CHECKING:
     from rotorid.mismatch.tell.verdict import Channel, Location
 
 MOST_WORDS = 40
-_NEARLY_ALL = 0.99
-"""Share that stays unexplained from which the causes named explain next to nothing."""
 MOST_NAMES = 2
 """Effects or values that the sentence names; more are counted."""
-_WORTH_SAYING_P = 0.05
-_WORTH_A_WORD = 0.03
-"""Share of the weight, or of the moment that the rotors can make, that a channel must stay off to be named: what a
-pilot trims without noticing is less."""
 _NO_BETTER = 0.02
 """Relative change of an error run forward below which it is neither better nor worse."""
 
@@ -152,8 +146,9 @@ def headline(contents: Contents) -> str:
 
 def unexplained_words(share: float) -> str:
     """What stays unexplained given the causes that were named, 0 to 1."""
-    if share >= _NEARLY_ALL:
-        return f"that explains less than {100 * (1 - _NEARLY_ALL):.0f} % of it"
+    nearly_all = 0.99  # Share that stays unexplained from which the causes named explain next to nothing.
+    if share >= nearly_all:
+        return f"that explains less than {100 * (1 - nearly_all):.0f} % of it"
     return f"{100 * share:.0f} % stays unexplained"
 
 
@@ -169,7 +164,10 @@ def _still_off(contents: Contents, how: _Sizes) -> str:
         if channel in known and named is not None:
             left[channel] = math.sqrt(max(named**2 - (own.noise_floor or 0.0) ** 2, 0.0))
     most = max(left, key=lambda c: left[c] / known[c].value, default=None)
-    if most in (None, contents.main) or left[most] < _WORTH_A_WORD * known[most].value:
+    # Share of the weight, or of the moment that the rotors can make, that a channel must stay off to be named: what a
+    # pilot trims without noticing is less.
+    worth_a_word = 0.03
+    if most in (None, contents.main) or left[most] < worth_a_word * known[most].value:
         return ""
     size = channel_size(contents.analysis, most, left[most], "named")
     off = f"{number(left[most])} {contents.channels[most].unit}"
@@ -357,7 +355,8 @@ def _places(contents: Contents) -> tuple[str, str, str, str, str, str]:
     if not contents.main or not here:
         return both, both, metres, both, metres, plain
     best = surest_location(here)
-    doubt = f" ({sure(best.p_value)})" if best.p_value is not None and best.p_value < _WORTH_SAYING_P else ""
+    worth_saying_p = 0.05
+    doubt = f" ({sure(best.p_value)})" if best.p_value is not None and best.p_value < worth_saying_p else ""
     when = _when(best, here, analysis)
     there = size_at(analysis, best) if when else None
     if there is None:

@@ -39,8 +39,6 @@ from rotorid.recordings.sufficient import basis_of
 __all__ = ["Verdict", "main_channel", "make_verdict", "spoken"]
 
 SCHEMA_PATH = Path(__file__).parents[4] / "workflow" / "schemas" / "verdict.schema.json"
-_SMALLEST_P = 1e-300
-"""Stated of a place whose p-value is smaller."""
 
 
 def _rounded(value: float | None) -> float | None:
@@ -52,7 +50,8 @@ _Number = Annotated[float | None, BeforeValidator(_rounded)]
 
 
 def _not_zero(p_value: float | None) -> float | None:
-    return None if p_value is None else min(max(float(p_value), _SMALLEST_P), 1.0)
+    smallest_p = 1e-300  # Stated of a place whose p-value is smaller.
+    return None if p_value is None else min(max(float(p_value), smallest_p), 1.0)
 
 
 _Probability = Annotated[Annotated[float, Field(ge=0, le=1)] | None, BeforeValidator(_rounded)]
