@@ -200,10 +200,10 @@ def decision_page() -> str:
     for room in ROOMS:
         lines += [f"### {room}", "", "| module | what it does |", "| --- | --- |"]
         found = modules_of(room)
-        for name, tree in found.items():
-            first = ast.get_docstring(tree).split("\n\n")[0]
+        for name, source in found.items():
+            first = ast.get_docstring(ast.parse(source)).split("\n\n")[0]
             lines.append(f"| `{name}` | {cell(first)} |")
-        constants = [(name, *one) for name, tree in found.items() for one in constants_of(tree)]
+        constants = [(name, *one) for name, source in found.items() for one in constants_of(source)]
         if constants:
             lines += ["", "| constant | value | meaning |", "| --- | --- | --- |"]
             lines += [f"| `{name}.{constant}` | {value:g} | {cell(why)} |" for name, constant, value, why in constants]
@@ -211,24 +211,51 @@ def decision_page() -> str:
     return "\n".join(lines)
 
 
-def modules_of(room: str) -> dict[str, ast.Module]:
-    """To the name of each module of a room of the mismatch stage, as below `rotorid.mismatch`, its syntax tree."""
+def modules_of(room: str) -> dict[str, str]:
+    """To the name of each module of a room of the mismatch stage, as below `rotorid.mismatch`, its source."""
     home = ROOT / "src" / "rotorid" / "mismatch"
     paths = [home / f"{room}.py"] if (home / f"{room}.py").is_file() else sorted((home / room).rglob("*.py"))
     names = {p: ".".join(p.relative_to(home).with_suffix("").parts).removesuffix(".__init__") for p in paths}
-    return {name: ast.parse(path.read_text(encoding="utf-8")) for path, name in names.items()}
+    return {name: path.read_text(encoding="utf-8") for path, name in names.items()}
 
 
-def constants_of(tree: ast.Module) -> list[tuple[str, float, str]]:
-    """Numbers of a module that have a docstring: name, value, docstring."""
-    found = []
+def constants_of(source: str) -> list[tuple[str, float, str]]:
+    """Numbers of a module that say what they are: name, value, meaning.
+
+    At the top of the module by a docstring; in a function, `function.name`, by a comment behind or above them.
+    """
+    tree, lines, found = ast.parse(source), source.splitlines(), []
     for line, after in zip(tree.body, tree.body[1:], strict=False):
-        name = line.targets[0].id if isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Name) else ""
-        value, why = (getattr(getattr(x, "value", None), "value", None) for x in (line, after))
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if name.isupper() and number and isinstance(after, ast.Expr) and isinstance(why, str):
+        name, value = number_of(line)
+        why = getattr(getattr(after, "value", None), "value", None)
+        if name.isupper() and isinstance(after, ast.Expr) and isinstance(why, str):
             found.append((name, value, why))
+    owners = [tree, *(n for n in tree.body if isinstance(n, ast.ClassDef))]
+    for function in (n for owner in owners for n in owner.body if isinstance(n, ast.FunctionDef)):
+        for line in ast.walk(function):
+            name, value = number_of(line)
+            why = comment_of(lines, line) if name else ""
+            if why:
+                found.append((f"{function.name}.{name}", value, why))
     return found
+
+
+def number_of(line: ast.AST) -> tuple[str, float]:
+    """Name and value of a number that a line of code gives a name to; no name for any other line."""
+    value = getattr(getattr(line, "value", None), "value", None)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if isinstance(line, ast.Assign) and len(line.targets) == 1 and isinstance(line.targets[0], ast.Name) and number:
+        return line.targets[0].id, value
+    return "", 0.0
+
+
+def comment_of(lines: list[str], line: ast.AST) -> str:
+    """The comment behind a line of code, or the lines of comment above it."""
+    _, sign, behind = lines[line.end_lineno - 1][line.end_col_offset :].partition("#")
+    first = line.lineno - 1
+    while not sign and lines[first - 1].lstrip().startswith("#"):
+        first -= 1
+    return behind.strip() or " ".join(part.strip().lstrip("# ") for part in lines[first : line.lineno - 1])
 
 
 def cell(text: str) -> str:

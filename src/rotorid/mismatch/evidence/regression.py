@@ -290,7 +290,9 @@ class Regression:
     def with_room(self, least: float) -> Regression:
         """The same with believed values that may move by at least a share `least`."""
         wider = replace(self)  # fits remembered are those of the narrower limits
-        wider.limit = np.maximum(self.limit, least)
+        values = self.columns(self.keys_of("value"))
+        wider.limit = self.limit.copy()
+        wider.limit[values] = np.maximum(self.limit[values], least)
         return wider
 
     def narrowed(self, places: Mapping[str, np.ndarray]) -> Regression:

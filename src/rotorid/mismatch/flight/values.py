@@ -102,7 +102,7 @@ def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) 
     curves = ids_of("curves_thrust")
     curve = next((f for f in findings if f.id in curves and f.status in CLAIMED), None)
     key = next((k for k in model.selection.active if model.search.terms[k].effect in curves), None)
-    if curve is None or key is None:
+    if curve is None or key is None or "thrust" not in model.regression.start:
         return findings, values
     fit, coefficient = model.selection.fit, believed_value(model.prepared.vehicle, "thrust")
     share = np.zeros(len(fit.columns))

@@ -69,7 +69,7 @@ def test_a_parcel_dropped_in_flight_is_a_payload_for_so_long():
     mass = found.parameters[0]
     assert mass.low < PARCEL_KG < mass.high and abs(mass.value - PARCEL_KG) < 0.003
     windows = {run: (start, stop) for run, start, stop in found.windows}
-    assert set(windows) == {"run00", "run01"} and analysis.split.held_out == ("run00",)
+    assert set(windows) == {"run00", "run01"} and analysis.split.held_out == ("run01",)
     assert windows["run01"][1] == pytest.approx(DROPPED_S, abs=0.1)
     assert windows["run00"] == pytest.approx(CARRIED["run00"], abs=0.1)
     assert "run01" in found.sentence and "12.0 s" in found.sentence

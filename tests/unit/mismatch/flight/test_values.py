@@ -2,6 +2,8 @@
 about a believed value where something beside it would make up for it.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from rotorid.mismatch.decide.select import Selection
 from rotorid.mismatch.decide.selected import SMALLEST_CHANGE, main_channels, relative_change, wrong_values
 from rotorid.mismatch.evidence.regression import build
 from rotorid.mismatch.evidence.rows import Rows, Term
-from rotorid.mismatch.flight.values import with_thrust_per_command, with_values_in_question
+from rotorid.mismatch.flight.values import with_square_term, with_thrust_per_command, with_values_in_question
 from tests.unit.mismatch import synthetic
 from tests.unit.mismatch.evidence.test_regression import RATE_HZ
 from tests.unit.mismatch.flights import quad
@@ -122,3 +124,15 @@ def test_thrust_per_command_is_another_full_speed_of_a_throttle_and_another_coef
     assert faster.rotor_speed_limits_rad_s == (0.0, 2000.0)
     ratio = faster.thrust_coefficients_n_s2() / vehicle.thrust_coefficients_n_s2()
     np.testing.assert_allclose(ratio, 1.21)
+
+
+def test_a_thrust_curve_has_no_square_of_a_thrust_coefficient_that_is_not_asked():
+    """With commands alone a scale of the commands stands in its place."""
+    term = SimpleNamespace(effect="thrust_curve")
+    model = SimpleNamespace(
+        selection=SimpleNamespace(active=["curve"]),
+        search=SimpleNamespace(terms={"curve": term}),
+        regression=SimpleNamespace(start={"curve": 0}),
+    )
+    findings = [SimpleNamespace(id="thrust_curve", status="established")]
+    assert with_square_term(findings, {}, model) == (findings, {})

@@ -150,7 +150,6 @@ def test_thrust_of_another_power_is_a_curve_alone() -> None:
     assert excess.low < -0.12 < excess.high and excess.high - excess.low < 0.05
 
 
-@pytest.mark.slow
 def test_a_slow_amplifier_is_no_offset_in_time() -> None:
     """A first-order lag of 1/(2π · 1.5 Hz) = 106 ms is its own derivative times 106 ms: five samples, not two."""
 

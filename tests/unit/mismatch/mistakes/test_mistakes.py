@@ -9,9 +9,11 @@ import pytest
 from rotorid.mismatch.mistakes import dropout, find_mistakes, lagged
 from rotorid.mismatch.mistakes.lagged import Blocks
 from rotorid.mismatch.mistakes.timing import Lateness, in_agreement, one_quantity
-from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import RecordingSet, Run, Vehicle, read_set
 from rotorid.recordings.held import SHORTEST_FREEZE_PERIODS, SHORTEST_FREEZE_S
 from rotorid.recordings.signal.kernels import gaussian
+from rotorid_proof.concealed import build as concealed
+from rotorid_proof.concealed import cases
 from tests.unit.mismatch.flights import COLUMNS, controlled, quad, recorded, with_table
 
 
@@ -492,7 +494,15 @@ def test_answers_of_a_controller_are_no_layout_but_a_doubt(hovering, change):
     assert not {"spin_direction", "rotor_order", "axis_sign"} & set(ids(findings))
     assert fixed.vehicle == hovering.vehicle
     (doubt,) = fixed.proposed
-    assert "turning senses" in doubt.sentence and "do not foretell" in doubt.sentence and not doubt.stops
+    assert "turning senses" in doubt.sentence and "not by the drag" in doubt.sentence and not doubt.stops
+
+
+def test_answers_that_past_torques_foretell_are_no_turning_senses(tmp_path):
+    """In gusts, rotors that follow their commands by a curve and 67 ms later."""
+    (case,) = cases.with_names(["feedback/both/26241a85/003"])
+    concealed.build(case, tmp_path / "sets", tmp_path / "answers")
+    _, findings, _ = find_mistakes(read_set(tmp_path / "sets" / case.set_name))
+    assert "spin_direction" not in ids(findings)
 
 
 def test_rotors_exchanged_are_found_next_to_answers_of_a_controller(hovering):
