@@ -29,7 +29,7 @@ class Imported:
     kind: str = "flight"
     """`flight` or `stand`."""
     speed_unit: str = "rad/s"
-    """Unit in which the log states rotor speeds: `rad/s`, `rpm` or `hz`."""
+    """Unit in which the log states rotor speeds, `rad/s`, `rpm` or `hz`; the runs have rad/s."""
     settings: Settings = field(default_factory=dict)
     """The autopilot's parameters, as they held for most of the flight or at its start."""
     unsigned_torque: bool = False
