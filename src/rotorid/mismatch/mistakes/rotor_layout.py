@@ -402,8 +402,8 @@ def _drags(m: _Moments, signs: np.ndarray) -> bool:
     A rotor that turns the other way does so with both of its torques. What a controller answers looks like the torque
     of speeding rotors up alone: it is the derivative of what rotors do.
     """
-    # Share of the believed torque coefficient: 0.6 and more where senses are wrong (drawn and real flights), at most
-    # 0.25 where none are and a controller answers gusts or its gyroscope's noise.
+    # Share of the believed torque coefficient: 0.6 and more wherever wrong senses came out as the true ones (drawn and
+    # real flights), none in ten flights with right senses whose controllers answer gusts or their gyroscope's noise.
     least_share = 0.3
     return float(np.abs(_yaw_row(m, signs)[: len(signs)]).max()) >= least_share
 
