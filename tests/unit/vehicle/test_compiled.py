@@ -171,7 +171,7 @@ def several_stated(**changes):
 @pytest.mark.parametrize("motors", [Motors(), Motors(0.03, 0.05, (300.0, 1500.0))], ids=["at once", "lag and limits"])
 def test_all_together_with_wind_and_disturbance(motors):
     how = dict(motors=motors, wind_m_s=np.array([3.0, -1.0, 0.5]), disturbance=Disturbance(0.2, 1e-3, 0.05))
-    assert_same(*flights(several(), duration_s=0.2, seed=2, **how))
+    assert_same(*flights(several(), duration_s=0.1, seed=2, **how))
 
 
 @pytest.mark.parametrize("kind", ["pid", "limited pid", "trimmed pid", "excited"])
@@ -193,7 +193,7 @@ def test_a_controller_flies_compiled_as_it_is_called(kind):
     # Smaller effects than elsewhere: a vehicle that tumbles makes any two roundings apart.
     held = [(form, 0.2 * np.asarray(values)) for form, values in several()]
     noise, motors = WhiteNoise(attitude_rad=0.01), Motors(0.03)
-    fast, slow = flights(held, controller=pilot, duration_s=0.5, start=begin, motors=motors, noise=noise, seed=1)
+    fast, slow = flights(held, controller=pilot, duration_s=0.25, start=begin, motors=motors, noise=noise, seed=1)
     assert np.abs(slow.angular_velocity).max() < 10.0
     assert_same(fast, slow)
 
@@ -207,7 +207,7 @@ def test_a_controller_that_gives_commands_alone_is_called():
     np.testing.assert_array_equal(trace.rotor_command, 900.0)
 
 
-def recorded(n=151, dt=0.004):
+def recorded(n=76, dt=0.004):
     """A flight as a recording."""
     trace = simulate(VEHICLE, Commands(dt * np.arange(n), commands_of(n, dt)), (n - 1) * dt, dt, START_HIGH)
     given = Inputs(trace.rotor_speed[0], wind=np.array([1.0, 2.0, 0.0]))
@@ -244,7 +244,7 @@ def test_windows_are_those_of_numpy(known, step_s):
 
 
 def assert_same_windows(vehicle, effects, time_s, inputs, states, step_s=None):
-    how = dict(window_s=0.3, step_s=step_s)
+    how = dict(window_s=0.12, step_s=step_s)
     fast = simulate_windows(vehicle, effects, time_s, inputs, states, **how).predicted
     with by_numpy(vehicle):
         slow = simulate_windows(vehicle, effects, time_s, inputs, states, **how).predicted

@@ -1,5 +1,7 @@
 """Drawn pairs of sets: the same name draws the same pair, and what changed is what its answer says."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -10,8 +12,16 @@ from rotorid_proof.concealed.continuous.equations import Strayed
 CHANGED, UNCHANGED = "continuous/test/004", "continuous/test/011"
 
 
+@pytest.fixture(scope="module", autouse=True)
+def short_runs() -> Iterator[None]:
+    """What is asked here hangs on no length of a run."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pairs, "RUN_S", 8.0)
+        yield
+
+
 @pytest.fixture(scope="module")
-def made() -> dict[str, pairs.Pair]:
+def made(short_runs: None) -> dict[str, pairs.Pair]:
     return {name: pairs.make(name) for name in (CHANGED, UNCHANGED)}
 
 
