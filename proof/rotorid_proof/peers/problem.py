@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.decide.values import believed_value
 from rotorid.mismatch.evidence.motion import regime_variables
 from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES
 from rotorid.mismatch.evidence.split import training_rule
 from rotorid.mismatch.flight.prepare import assemble_rows, prepare
-from rotorid.mismatch.flight.values import believed_value
 from rotorid.recordings import RecordingSet
 
 WRENCH = 6

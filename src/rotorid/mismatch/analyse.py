@@ -24,50 +24,45 @@ from rotorid.mismatch.decide.findings import (
     RunWind,
     by_channel,
     in_interval,
+    next_flight,
     rms,
     with_probabilities,
 )
 from rotorid.mismatch.decide.posterior import Found
+from rotorid.mismatch.decide.problem import Values
 from rotorid.mismatch.decide.selected import coefficients, path_findings, wrench_findings
 from rotorid.mismatch.decide.sizes import fitted_part
 from rotorid.mismatch.decide.statements import UpperLimit
 from rotorid.mismatch.decide.status import CLAIMED, Estimate
+from rotorid.mismatch.decide.values import absorbed_findings, changed_vehicle, contract_values, with_values_in_question
+from rotorid.mismatch.decide.ways import beyond_trust, in_words, residuals_of, settled
 from rotorid.mismatch.deliver.by_vehicle import acting_over_rows, on_vehicle
 from rotorid.mismatch.deliver.candidates import Candidate, Ground
 from rotorid.mismatch.deliver.files import claimed, conditions_of, instruments_of, place_of, with_effects
 from rotorid.mismatch.deliver.final import Choice, Stretches, delivered
 from rotorid.mismatch.deliver.flown import model_of, squares_of_windows
-from rotorid.mismatch.deliver.usable import as_a_body, chain_ids, question_of, with_only
+from rotorid.mismatch.deliver.usable import as_a_body, question_of
 from rotorid.mismatch.evidence.motion import Segment, full_speed, regime_variables, stretches
 from rotorid.mismatch.evidence.regression import Fit
 from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term
 from rotorid.mismatch.evidence.speedpath import CommandChain
 from rotorid.mismatch.evidence.split import parts_of, split_runs
-from rotorid.mismatch.flight.absent import absent, absorbed_findings, chosen_already
-from rotorid.mismatch.flight.delivered import (
-    Values,
-    believed_residuals,
-    beyond_trust,
-    in_words,
-    residuals_of,
-    settled,
-    values_without_path,
-)
-from rotorid.mismatch.flight.fitted import Decided, Fitted, Watch, fitted, next_flight, unwatched
+from rotorid.mismatch.flight.absent import absent, chosen_already
+from rotorid.mismatch.flight.every_run import lacking, on_every_run, scaled_by_run
+from rotorid.mismatch.flight.fitted import Decided, Fitted, Watch, fitted, unwatched
 from rotorid.mismatch.flight.gains import values_alone
 from rotorid.mismatch.flight.gusts import gust_finding
 from rotorid.mismatch.flight.leftover import dependence, leftover
 from rotorid.mismatch.flight.prepare import Prepared, prepare, prepare_like
-from rotorid.mismatch.flight.report_runs import lacking, on_every_run, scaled_by_run, without_each
 from rotorid.mismatch.flight.swinging import loads, on_board
 from rotorid.mismatch.flight.values import (
-    changed_vehicle,
-    contract_values,
+    believed_residuals,
     only_throttle,
+    values_without_path,
     with_square_term,
     with_thrust_per_command,
-    with_values_in_question,
 )
+from rotorid.mismatch.flight.without import chain_ids, with_only, without_each
 from rotorid.mismatch.flight.wrench import WrenchModel, linear_drag, nonlinear_intervals
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet, Vehicle
@@ -502,7 +497,7 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     """
     surely_heavier = 2.0  # Standard errors by which a vehicle must be heavier than believed to carry a payload.
     sure = {key: change for key, (change, sd) in values.items() if abs(change) > surely_heavier * sd}
-    heavier = sure.get("mass", 0.0) > 0 or sure.get("thrust", 0.0) < 0
+    heavier = max(sure.get("mass", 0.0), sure.get("lifted", 0.0)) > 0 or sure.get("thrust", 0.0) < 0
     stated = [f for f in findings if f.status in CLAIMED]
     load = next(e for e in catalogue().values() if e.like_on_heavier)
     first, *others = load.like_on_heavier

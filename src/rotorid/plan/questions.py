@@ -29,6 +29,7 @@ from rotorid.mismatch.analyse import decided, findings_outside
 from rotorid.mismatch.decide.findings import Analysis, Finding
 from rotorid.mismatch.decide.select import COST_PER_PARAMETER
 from rotorid.mismatch.decide.status import CLAIMED
+from rotorid.mismatch.decide.ways import ways
 from rotorid.mismatch.deliver.derivatives import learn
 from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S
 from rotorid.mismatch.evidence.motion import Segment
@@ -36,7 +37,6 @@ from rotorid.mismatch.evidence.regression import Regression, autoregression
 from rotorid.mismatch.evidence.rows import Term, residual
 from rotorid.mismatch.evidence.speedpath import starts_of, steps_of
 from rotorid.mismatch.evidence.split import parts_of, split_runs
-from rotorid.mismatch.flight.delivered import ways
 from rotorid.mismatch.flight.fitted import Fitted, fitted
 from rotorid.mismatch.flight.prepare import Prepared, assemble_rows, prepare
 from rotorid.mismatch.flight.wrench import WrenchModel, chosen, path_segments

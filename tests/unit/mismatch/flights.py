@@ -220,6 +220,11 @@ def recorded(*seeds: int, flight=None, vehicle: Vehicle | None = None, **how) ->
     return RecordingSet("hand-made", vehicle or quad(), runs)
 
 
+def as_commands(table):
+    """The rotor speeds' columns as commands."""
+    return table.rename(columns={name: name.replace("speed", "command") for name in COLUMNS["rotors"]})
+
+
 def with_table(recordings: RecordingSet, change, *only: str) -> RecordingSet:
     """The set with every run's table, or those of `only` some runs, as `change` returns it, or changes it in place."""
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from rotorid.mismatch import analyse as module
-from rotorid.mismatch.flight.report_runs import comparable, lacking
+from rotorid.mismatch.flight.every_run import comparable, lacking
 from rotorid.recordings import RecordingSet, templates
 from rotorid.vehicle.control import swings
 from tests.refusals import refused

@@ -20,9 +20,9 @@ from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import autoregression, build
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.evidence.speedpath import Chain, candidate_forms
+from rotorid.mismatch.flight.every_run import as_flown
 from rotorid.mismatch.flight.fitted import Fitted
 from rotorid.mismatch.flight.prepare import assemble_rows
-from rotorid.mismatch.flight.report_runs import as_flown
 
 _OF_ROTORS = "offset:rotors"
 """Start of the keys of offsets in time that are a delay of the commands: the chain has it."""

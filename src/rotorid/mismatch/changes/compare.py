@@ -67,6 +67,7 @@ from rotorid.mismatch.decide.statements import (
     widened,
 )
 from rotorid.mismatch.decide.status import CLAIMED, Estimate, Status
+from rotorid.mismatch.decide.values import believed_value
 from rotorid.mismatch.decide.words import (
     capital,
     channel_words,
@@ -92,13 +93,12 @@ from rotorid.mismatch.flight.swinging import (
     price,
     share_left,
 )
-from rotorid.mismatch.flight.values import believed_value
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import one_thread, step
 
 _LARGER = 2.0
 """How many times the residual of the first set that of the second must be, in some force or moment, to be noted."""
-_KEYS = {name: key for key, name in NAMES.items()}
+_KEYS = {name: key for key, name in NAMES.items() if key != "lifted"}  # of one set alone
 
 
 @dataclass(frozen=True)
@@ -450,7 +450,8 @@ def explaining(
 ) -> tuple[list[Change], list[Change], dict[str, tuple[str, ...]]]:
     """Changes that agree with what differs, those that contradict it, and which differences the former predict.
 
-    Together they predict; where that lies outside of a difference's interval, the change that predicts most of it goes.
+    Together they predict; where that lies outside of a difference's interval, the change that predicts most of it goes,
+    of those that are only suggested if there are any.
     """
     surely = 0.999  # Probability of the interval outside of which a prediction contradicts what differs.
     left, refused = list(changes), []
@@ -466,7 +467,7 @@ def explaining(
         ]
         if not wrong:
             break
-        gone = max(wrong, key=lambda w: w[0])[1]
+        gone = max(wrong, key=lambda w: (w[1].status == "suggested", w[0]))[1]
         left.remove(gone)
         refused.append(gone)
     explained = {

@@ -24,9 +24,9 @@ from rotorid.mismatch.evidence.motion import Segment, regime_variables
 from rotorid.mismatch.evidence.regression import NEVER_EXCITED, Regression
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.flight.absent import squares_of
+from rotorid.mismatch.flight.every_run import as_flown, comparable
 from rotorid.mismatch.flight.fitted import Fitted, fitted
 from rotorid.mismatch.flight.prepare import assemble_rows, prepare, prepare_like, value_terms
-from rotorid.mismatch.flight.report_runs import as_flown, comparable
 from rotorid.mismatch.flight.wrench import WrenchModel, chosen
 from rotorid.mismatch.instrument.model import ReadingModel
 from rotorid.mismatch.mistakes import find_mistakes, in_its_units
@@ -123,7 +123,7 @@ def reference_of(base: RecordingSet) -> FittedReference:
     model = found.model
     # What one set's commands cannot tell apart from their own scale changes all the same from set to set.
     values = value_terms(model.prepared.vehicle, model.prepared.groups)
-    terms = [*values, *(t for t in model.terms if not t.run and t.kind != "value")]
+    terms = [*values, *(t for t in model.terms if not t.run and t.kind not in ("value", "held"))]
     # As another set's stretches are made: what making them leaves out is left out of both.
     recorded, noisy = _recorded_stretches(found, base)
     chain = chain_terms(found, recorded)

@@ -16,11 +16,13 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
+from rotorid.effects.describe import advice
 from rotorid.effects.loading import InstrumentFacts, Loading
 from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.statements import LIKELY, SURE, Statement, share_of, statements_of, weights_of
 from rotorid.mismatch.decide.status import CLAIMED, Estimate, Status
 from rotorid.mismatch.decide.support import Support
+from rotorid.mismatch.evidence.rows import CHANNELS, Rows
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 from rotorid.recordings import RecordingSet, Split, Vehicle
 from rotorid.recordings.run import Doubt
@@ -333,3 +335,35 @@ def _with_probability(claim: Finding, probability: float, stated: Statement | No
     if probability >= LIKELY:
         return replace(claim, probability=probability, status="suggested", objection=reason)
     return not_held(claim.id, reason, rule="probability", probability=probability)
+
+
+@dataclass(frozen=True)
+class NextFlight:
+    """What to do, and the ids that it separates; empty where nothing is open."""
+
+    manoeuvre: str = ""
+    separates: tuple[str, ...] = ()
+
+
+def next_flight(findings: Sequence[Finding], recordings: RecordingSet) -> NextFlight:
+    """For the first class that the data leave open."""
+    for finding in findings:
+        if finding.status == "ambiguous":
+            ids = tuple(finding.alternatives)
+            return NextFlight(advice(catalogue()[finding.id], recordings), ids)
+    return NextFlight()
+
+
+def on_traces(
+    traces: Sequence[ChannelTrace], rows: Sequence[Rows], left: Sequence[np.ndarray]
+) -> tuple[np.ndarray, ...]:
+    """Residuals (n, channels) of every stretch on the traces; what is delivered where a trace is of none of them."""
+    known = {}
+    for r, part in zip(rows, left, strict=True):
+        known |= {(r.run, first_s(r.time_s), CHANNELS[k]): values for k, values in enumerate(part.T)}
+    return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.named) for t in traces)
+
+
+def first_s(time_s: np.ndarray) -> float:
+    """First instant of a stretch; of one without rows infinity."""
+    return float(time_s[0]) if len(time_s) else np.inf

@@ -16,6 +16,9 @@ moment over the inertia. With δ = ln(true / believed) of the values and A from 
 
 so that the evidence of every small subset of wrong values is a multivariate t density of the gains (O'Hagan and
 Forster, Kendall's Advanced Theory of Statistics 2B, 2004, 9.7). Values of one ratio have the same gains: a class.
+
+Where commands alone say how fast rotors turn, C_F is taken as what carries the believed mass: the first gain is not
+known, and a wrong mass (`lifted`) is in the other three.
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ GAINS = ("mass", "inertia_xx", "inertia_yy", "inertia_zz")
 """To each gain the value that stands in its denominator."""
 _OF_GAINS: Mapping[str, tuple[float, float, float, float]] = {
     "mass": (-1, 0, 0, 0),
+    "lifted": (0, 1, 1, 1),
     "thrust": (1, 1, 1, 0),
     "torque": (0, 0, 0, 1),
     "inertia_xx": (0, -1, 0, 0),
@@ -40,12 +44,17 @@ _OF_GAINS: Mapping[str, tuple[float, float, float, float]] = {
     "inertia_zz": (0, 0, 0, -1),
     "arm": (0, 1, 1, 0),
 }
-"""To each value what a larger logarithm of it adds to each gain."""
+"""To each value what a larger logarithm of it adds to each gain; `lifted` where commands alone are known."""
 
 
 Values = dict[str, tuple[float, float]]
 """Relative change and one-sigma of believed values, by the key of their term."""
-_RATIOS = {"mass": ("thrust",), "arm": ("inertia_xx", "inertia_yy"), "torque": ("inertia_zz",)}
+_RATIOS = {
+    "mass": ("thrust",),
+    "lifted": ("torque", "arm"),
+    "arm": ("inertia_xx", "inertia_yy"),
+    "torque": ("inertia_zz",),
+}
 """Believed values of which a flight knows no more than the ratio to others. Were both free, noise alone would say what
 they have in common (the residual is itself their sum): the first stay as believed, their doubt is the others'."""
 _HELD_SD = 1e-4

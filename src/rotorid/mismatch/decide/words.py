@@ -163,3 +163,7 @@ def listed(names: list[str], last: str = "and") -> str:
 def capital(text: str) -> str:
     """The text with its first letter raised."""
     return text[:1].upper() + text[1:]
+
+
+TAKEN_UP = "without recorded rotor speeds it is one with the curve between throttle and thrust"
+"""Why an effect is not looked for that on commands alone is that curve."""

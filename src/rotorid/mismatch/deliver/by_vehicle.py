@@ -16,9 +16,9 @@ import numpy as np
 from rotorid.effects.contract import Motion
 from rotorid.mismatch.decide.problem import Values
 from rotorid.mismatch.decide.selected import Factors, as_fitted
+from rotorid.mismatch.decide.values import changed_vehicle
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.rows import Term
-from rotorid.mismatch.flight.values import changed_vehicle
 from rotorid.recordings import Vehicle
 
 

@@ -15,9 +15,9 @@ from typing import Literal
 
 import numpy as np
 
+from rotorid.mismatch.decide.problem import Values
 from rotorid.mismatch.deliver.derivatives import Learnt
 from rotorid.mismatch.evidence.regression import Fit
-from rotorid.mismatch.flight.delivered import Values
 
 _PLAINEST_FIRST = (
     ("believed", False),

@@ -17,16 +17,17 @@ import numpy as np
 
 from rotorid.mismatch.decide.enough import NOTHING, lowered, may_be_nothing, with_shares
 from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Delivery, Finding, ValueRow
+from rotorid.mismatch.decide.problem import Values
 from rotorid.mismatch.decide.select import NEAR_LIMIT
 from rotorid.mismatch.decide.selected import coefficients
 from rotorid.mismatch.decide.status import CLAIMED
+from rotorid.mismatch.decide.values import believed_value
+from rotorid.mismatch.decide.ways import FittedModel, all_free, ways
 from rotorid.mismatch.deliver.candidates import Candidate, CandidateScore, Ground, choose
 from rotorid.mismatch.deliver.derivatives import Learnt, learn
 from rotorid.mismatch.deliver.files import claimed, improved_vehicle, place_of
 from rotorid.mismatch.deliver.usable import exports_lost
 from rotorid.mismatch.evidence.rows import CHANNELS, Term
-from rotorid.mismatch.flight.delivered import FittedModel, Values, all_free, ways
-from rotorid.mismatch.flight.values import believed_value
 from rotorid.recordings import Split, Vehicle
 from rotorid.steps import step
 from rotorid.vehicle.derivatives import about_hover_of, own_controls

@@ -1,30 +1,19 @@
-"""Whether a vehicle is a body that hovers and flies, and the model of a flight with fewer of its parts.
+"""Whether a vehicle is a body that hovers and flies.
 
 A value can leave every channel better and still be that of no vehicle: a thrust coefficient that absorbs a drag may
-leave a maximum thrust below the weight. What is only suggested takes no part in what is delivered: believed values,
-nuisances and the effects that stay are fitted anew without it.
+leave a maximum thrust below the weight.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from itertools import product
 
 import numpy as np
 
-from rotorid.effects.catalogue import moving_air
 from rotorid.errors import InputError
-from rotorid.mismatch.decide.select import Selection
-from rotorid.mismatch.evidence.motion import Segment
-from rotorid.mismatch.evidence.rows import Contributions
-from rotorid.mismatch.evidence.unknowns import UNKNOWNS
-from rotorid.mismatch.flight.delivered import Values
-from rotorid.mismatch.flight.fitted import Fitted
-from rotorid.mismatch.flight.prepare import assemble_rows
-from rotorid.mismatch.flight.report_runs import chain_without, without_wind
-from rotorid.mismatch.flight.values import changed_vehicle
-from rotorid.mismatch.flight.wrench import WrenchModel, path_segments, whitened
+from rotorid.mismatch.decide.problem import Values
+from rotorid.mismatch.decide.values import changed_vehicle
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.body import body_of, unfit
@@ -237,63 +226,3 @@ def exports_lost(vehicle: Vehicle, believed: Vehicle) -> tuple[str, ...]:
         except InputError as error:
             out.append(f"The improved vehicle cannot be exported as {form}: {error}.")
     return tuple(out)
-
-
-def with_only(found: Fitted, ids: Collection[str], values: Values) -> Fitted:
-    """What was fitted with the effects `ids` and the wrong `values` alone; terms without a name stay.
-
-    Rows are built anew where what goes lies between command and speed, or is air that moves.
-    """
-    model = found.model
-    active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
-    gone = sorted(chain_ids(found) - set(ids))
-    chain = chain_without(found, gone) if gone else found.chain
-    still = model.wind is not None and moving_air("all the time").id not in ids
-    calm = bool(model.gusts) and moving_air("in windows").id not in ids
-    if (gone and found.commanded) or still or calm:
-        segments, noisy = model.segments, model.noisy_segments
-        if gone and found.commanded:
-            cutoff = model.prepared.thinner.cutoff_hz
-            segments, noisy = (path_segments(s, chain, cutoff) for s in (segments, noisy))
-        steady = None if model.wind is None else np.array([*model.wind, 0.0])
-        if calm:
-            segments, noisy = ([_in_air(s, steady) for s in own] for own in (segments, noisy))
-        if still:
-            segments, noisy = ([_in_air(s, without_wind(s, model.wind)) for s in own] for own in (segments, noisy))
-        own = {"wind": None if still else model.wind, "gusts": () if calm else model.gusts}
-        model = _rebuilt(replace(model, **own), segments, noisy, active)
-    fit = model.regression.fit([t.key for t in model.regression.terms if t.kind != "effect"] + active, jackknife=True)
-    model = replace(model, selection=replace(model.selection, active=active, fit=fit))
-    return replace(found, model=model, chain=chain, values=values)
-
-
-def _in_air(segment: Segment, wind: np.ndarray | None) -> Segment:
-    """A stretch in air that moves by `wind` (3,) or (n, 3), m/s, world axes; still for None."""
-    return replace(segment, motion=replace(segment.motion, wind=wind))
-
-
-def _rebuilt(
-    model: WrenchModel, segments: Sequence[Segment], noisy: Sequence[Segment], active: Sequence[str]
-) -> WrenchModel:
-    """A model's rows and regression on changed stretches, with its own noise and terms; nothing is searched."""
-    prepared, old = model.prepared, model.regression
-    kinds = {"effect"} if model.gusts else {"effect", "wind"}
-    terms = [t for t in old.terms if t.kind not in kinds or t.key in active]
-    rows = assemble_rows(prepared, terms, list(segments), model.effects)
-    again = assemble_rows(prepared, terms, list(noisy), model.effects) if noisy else None
-    regression = whitened(prepared, rows, terms, old.filters, list(segments), again, apart=True)
-    return replace(
-        model,
-        terms=terms,
-        rows=rows,
-        regression=regression,
-        segments=list(segments),
-        noisy_segments=list(noisy),
-        contributions=Contributions(rows, again, prepared.thinner.rate_hz),
-        selection=Selection(list(active), model.selection.fit),
-    )
-
-
-def chain_ids(found: Fitted) -> set[str]:
-    """Ids of the effects between command and rotor speed."""
-    return set() if found.chain is None else {key for key, _ in found.chain.result.fit.chain}

@@ -526,9 +526,9 @@ def chain_of_lift(
     if found.sags:
         supply = _of_stage(SUPPLY)
         add(supply, supply.about(found.voltage_reference_v / full_voltage), found.voltage)
-    surely_late = 3.0  # Standard errors by which rotors must be late to be called so.
-    # Between two commands nobody recorded what happened.
-    if found.lag_s is not None and found.lag_s[0] > max(surely_late * found.lag_s[1], 0.5 / command_rate_hz):
+    # Standard errors by which rotors must be later than commands are which hold until the next: half a sample.
+    surely_late = 3.0
+    if found.lag_s is not None and found.lag_s[0] - 0.5 / command_rate_hz > surely_late * found.lag_s[1]:
         late = _of_stage(found.late_by)
         add(late, late.speed_forms[0], found.lag_s)
         if found.one_of_two:

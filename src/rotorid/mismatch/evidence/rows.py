@@ -46,12 +46,15 @@ PARAMETER_NAMES = {
     "thrust": "thrust_coefficient_n_s2",
     "torque": "torque_coefficient_n_m_s2",
     "mass": "mass_kg",
+    "lifted": "mass_kg",
     "inertia_xx": "inertia_xx_kg_m2",
     "inertia_yy": "inertia_yy_kg_m2",
     "inertia_zz": "inertia_zz_kg_m2",
     "arm": "arm_scale",
     "speed": "rotor_speed_limits_rad_s",
 }
+"""Keys of believed values to their contract names. `lifted` is the mass where commands alone say how fast rotors turn:
+their thrust is then what lifts the believed mass, and a heavier vehicle has larger moments of the rotors."""
 
 UNKNOWNS_OF_A_STATE = 4
 """Of what swings, where a piece of a run begins: two angles and two rates."""
@@ -64,7 +67,8 @@ class Term:
     key: str
     """Unique: `id/form` for an effect, a name of `PARAMETER_NAMES`, or `offset:…` for a nuisance."""
     kind: str
-    """`effect`, `value` (a believed number), `nuisance`, `wind`, or, for intervals alone, `slope` and `state`."""
+    """`effect`, `value` (a believed number), `held` (one that stays as believed until it is called wrong), `nuisance`,
+    `wind`, or, for intervals alone, `slope` and `state`."""
     effect: str = ""
     form: Form | None = None
     values: tuple[float, ...] = ()
@@ -280,6 +284,8 @@ def value_columns(
         out = {"force": force, "moment": arm}
     elif key == "torque":
         out = {"moment": torque}
+    elif key == "lifted":
+        out = {"moment": arm + torque}
     elif key == "arm":
         out = {"moment": arm}
     elif key == "mass":
@@ -524,3 +530,27 @@ def forms_reading(acting: Iterable, loading: Loading, vehicle: Vehicle) -> np.nd
         for kind in ("force", "moment")
     ]
     return sum((a.reading for a in added if a.reading is not None), at_sensor(*on_body, loading.motion, vehicle))
+
+
+def form_terms(effect_id: str, form: Form, suggested: tuple[tuple[float, ...], ...] = ()) -> list[Term]:
+    """One term per starting point of a form's nonlinear parameters: those `suggested`, or else the form's own."""
+    starts = list(suggested) or [()]
+    for index in () if suggested else form.nonlinear:
+        starts = [s + (v,) for s in starts for v in form.parameters[index].starts]
+    terms = []
+    for number, start in enumerate(starts):
+        values = np.zeros(len(form.parameters))
+        values[list(form.nonlinear)] = start
+        suffix = f"#{number}" if len(starts) > 1 else ""
+        terms.append(
+            Term(
+                f"{effect_id}/{form.name}{suffix}",
+                "effect",
+                effect_id,
+                form,
+                tuple(values),
+                max(1, len(form.linear)),
+                (np.inf,) * max(1, len(form.linear)),
+            )
+        )
+    return terms

@@ -13,16 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.statements import UpperLimit, limits_of
 from rotorid.mismatch.decide.support import Chosen, chosen_at
 from rotorid.mismatch.evidence.gram import Evidence, evidence_from
 from rotorid.mismatch.evidence.regression import Regression
 from rotorid.mismatch.evidence.rows import Rows, Term
-from rotorid.mismatch.evidence.unknowns import UNKNOWNS
-from rotorid.mismatch.flight.delivered import FittedModel, Values
 from rotorid.mismatch.flight.wrench import WrenchModel, whitened
 from rotorid.recordings import Vehicle
 
@@ -78,25 +74,3 @@ def scales(vehicle: Vehicle) -> np.ndarray:
     weight_n = vehicle.mass_kg * vehicle.gravity_m_s2
     arm_m = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).mean())
     return np.repeat([weight_n, weight_n * arm_m if arm_m > 0 else np.inf], 3)
-
-
-def absorbed_findings(model: FittedModel, values: Values, findings: list[Finding]) -> list[Finding]:
-    """A finding for every such effect that `findings` do not hold; none where no value is wrong."""
-    if not values:
-        return []
-    search, regression, active = model.search, model.search.regression, model.selection.active
-    held = [k for k in search.always if k not in values]
-    base = regression.fit(held + active)
-    taken, out = {f.id for f in findings}, {}
-    absorbed_p = 1e-6  # About fifty terms are looked at.
-    absorbed_gain = 50.0  # Whitened squares: what a reader would have taken for an effect.
-    for term in regression.terms:
-        if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
-            continue
-        fit = regression.fit([*held, *active, term.key])
-        p = regression.wald(fit, regression.columns([term.key]), search.blocks)
-        if p < absorbed_p and fit.gain - base.gain > absorbed_gain:
-            name = catalogue()[term.effect].name
-            text = f"{name} looked significant with the believed values; the refitted values explain it"
-            out[term.effect] = Finding(id=term.effect, status="absorbed", sentence=text, p_value=p)
-    return list(out.values())

@@ -16,17 +16,17 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue, ids_of, ids_of_stage
 from rotorid.effects.contract import CURVE, Form
-from rotorid.effects.describe import advice
 from rotorid.mismatch.decide import rules
 from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.problem import Values
 from rotorid.mismatch.decide.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.decide.selected import coefficients
+from rotorid.mismatch.decide.words import TAKEN_UP
 from rotorid.mismatch.evidence.rows import RUN_SCALE, Term
 from rotorid.mismatch.evidence.speedpath import CommandChain
-from rotorid.mismatch.flight.delivered import Values
 from rotorid.mismatch.flight.gains import wrong_values_of
 from rotorid.mismatch.flight.gusts import with_gusts
-from rotorid.mismatch.flight.prepare import Prepared
+from rotorid.mismatch.flight.prepare import Prepared, value_term
 from rotorid.mismatch.flight.swinging import (
     Windows,
     as_effect,
@@ -55,14 +55,11 @@ from rotorid.mismatch.flight.wrench import (
     with_wind,
     wrench_model,
 )
-from rotorid.recordings import RecordingSet
 from rotorid.recordings.signal.kernels import causal
 
-TAKEN_UP = "without recorded rotor speeds it is one with the curve between throttle and thrust"
-"""Why an effect is not looked for that on commands alone is that curve."""
 FOLLOWED = "in this recording commands follow roll and pitch, and not roll and pitch the commands"
 """Why what turns a vehicle is not asked for where its controller answers disturbances alone."""
-_GAINS_OF_MOMENTS = frozenset({"torque", "arm", "inertia_xx", "inertia_yy", "inertia_zz"})
+_GAINS_OF_MOMENTS = frozenset({"lifted", "torque", "arm", "inertia_xx", "inertia_yy", "inertia_zz"})
 
 
 @dataclass(frozen=True)
@@ -94,10 +91,16 @@ def fitted(prepared: Prepared) -> Fitted:
     measured = all(s.measured_speed for s in prepared.segments)
     chain = speed_path(prepared)
     if chain is None or measured:
-        model = refined_model(prepared, *turning(prepared))
+        known, both = prepared, turning(prepared)
     else:
-        model = refined_model(known_by_commands(prepared, chain), *turning(prepared, chain))
+        known, both = known_by_commands(prepared, chain), turning(prepared, chain)
+    model = refined_model(known, *both)
     values, instead = wrong_values_of(model)
+    if held := values.keys() & set(model.regression.keys_of("held")):
+        # A wrong mass has other effects make up for it: once more with it as free as any value.
+        freed = [value_term(t.key, known.vehicle) if t.key in held else t for t in known.terms]
+        model = refined_model(replace(known, terms=freed), *both)
+        values, instead = wrong_values_of(model)
     return Fitted(model, values, chain, measured, instead)
 
 
@@ -299,23 +302,6 @@ def _cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:
             left += float((causal(taps, part[:, channel])[len(taps) :] ** 2).sum())
     terms = [model.search.terms[k] for k in model.selection.active]
     return left + sum(COST_PER_EFFECT + COST_PER_PARAMETER * t.size for t in terms)
-
-
-@dataclass(frozen=True)
-class NextFlight:
-    """What to do, and the ids that it separates; empty where nothing is open."""
-
-    manoeuvre: str = ""
-    separates: tuple[str, ...] = ()
-
-
-def next_flight(findings: Sequence[Finding], recordings: RecordingSet) -> NextFlight:
-    """For the first class that the data leave open."""
-    for finding in findings:
-        if finding.status == "ambiguous":
-            ids = tuple(finding.alternatives)
-            return NextFlight(advice(catalogue()[finding.id], recordings), ids)
-    return NextFlight()
 
 
 @dataclass(frozen=True)

@@ -20,14 +20,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.decide.problem import GAINS, LogGain, Prior, called_wrong, in_place, options_of, same_ratio
+from rotorid.mismatch.decide.problem import (
+    GAINS,
+    LogGain,
+    Prior,
+    Values,
+    called_wrong,
+    in_place,
+    options_of,
+    same_ratio,
+)
 from rotorid.mismatch.decide.select import Selection
 from rotorid.mismatch.decide.selected import SMALLEST_CHANGE, SMALLEST_SIZE, coefficients, wrong_values
 from rotorid.mismatch.decide.statements import SURE
 from rotorid.mismatch.evidence.regression import DOUBT_OF_CORRECTION, Regression, ridge_inverse
 from rotorid.mismatch.evidence.rows import winds_last
-from rotorid.mismatch.flight.delivered import GAINS_OF_COMMANDS, Values
-from rotorid.mismatch.flight.prepare import assemble_rows
+from rotorid.mismatch.flight.prepare import assemble_rows, prior_of
+from rotorid.mismatch.flight.values import GAINS_OF_COMMANDS
 from rotorid.mismatch.flight.wrench import WrenchModel, after_residual, chosen, whitened
 from rotorid.recordings.signal.kernels import low_pass
 
@@ -40,8 +49,8 @@ def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> tuple[Values,
 
     Of two values of one ratio the one is named by which the regression explains more, where it does so beyond doubt.
     """
-    trust = _trust_of(model)
-    options, least = options_of(gains_of(model, prior), trust, prior), float(np.log(SURE / (1.0 - SURE)))
+    trust, least = _trust_of(model), float(np.log(SURE / (1.0 - SURE)))
+    options = options_of(gains_of(model, prior), trust, prior)
     regression, size = model.search.regression, _size_of_value(model)
     always = [*regression.keys_of("nuisance", "wind"), *model.selection.active]
 
@@ -49,7 +58,11 @@ def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> tuple[Values,
         """Nats."""
         return 0.5 * regression.fit([*always, *sorted(wrong)], loose=dict.fromkeys(wrong, _FREE_SD)).gain
 
-    refused: list[str] = []
+    # Any laboratory has weighed its vehicle: from commands alone a mass is named where nothing else explains as much.
+    with_mass, others = (
+        [o.log_posterior for w, o in options.items() if ("lifted" in w) == own] for own in (True, False)
+    )
+    refused = ["lifted"] if with_mass and max(with_mass) < max(others) + least else []
     while wrong := called_wrong(options, least, refused):
         best = max((w for w in same_ratio(wrong, trust) if not w.intersection(refused)), key=explained)
         if explained(best) - explained(wrong) > least:
@@ -63,16 +76,15 @@ def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> tuple[Values,
 
 
 def _trust_of(model: WrenchModel) -> dict[str, float]:
-    """Relative one-sigma of every believed value.
+    """Relative one-sigma of every believed value that may be called wrong.
 
     A payload may be aboard of a vehicle whose centre of mass is off its place: then its mass is the least known of all.
     """
     trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
+    trust |= {key: prior_of(key, model.prepared.vehicle) for key in model.regression.keys_of("held")}
     load = next(e for e in catalogue().values() if e.like_on_heavier)
-    if "mass" in trust and {load.id, *load.like_on_heavier} & {
-        model.search.terms[k].effect for k in model.selection.active
-    }:
-        trust["mass"] = max(trust.values())
+    if {load.id, *load.like_on_heavier} & {model.search.terms[k].effect for k in model.selection.active}:
+        trust |= dict.fromkeys({"mass", "lifted"} & trust.keys(), max(trust.values(), default=0.0))
     return trust
 
 

@@ -44,6 +44,7 @@ from rotorid.mismatch.evidence.rows import (
     assemble,
     baseline_wrench,
     form_columns,
+    form_terms,
     high_passed,
     offset_columns,
     project,
@@ -62,7 +63,7 @@ from rotorid.steps import step
 _FIELDS = frozenset(f.name for f in fields(Motion))
 MOST_BYTES = 256e6
 """Of all that is kept; what was made first is forgotten first."""
-DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
+DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "lifted": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
 MOST_S, MOST_SAMPLES, _PIECE_S = 600.0, 100_000, 20.0
 """Longer recordings are represented by pieces: neither memory nor time must grow with an hour's flight."""
@@ -252,20 +253,31 @@ def prior_of(key: str, vehicle: Vehicle) -> float:
     return DEFAULT_TRUST["inertia" if key.startswith("inertia") else key]
 
 
-def value_terms(vehicle: Vehicle, groups: Sequence[str]) -> list[Term]:
-    """A term for each believed value that acts in the groups of channels."""
+def value_terms(vehicle: Vehicle, groups: Sequence[str], commanded: bool = False) -> list[Term]:
+    """A term for each believed value that acts in the groups of channels.
+
+    `commanded` says that commands alone tell how fast rotors turn.
+    """
     values = {"thrust", "mass"} if "force" in groups else set()
     if "moment" in groups:
         values |= {"thrust", "torque", "inertia_xx", "inertia_yy", "inertia_zz", "arm"}
-    return [Term(key, "value", prior_sd=(prior_of(key, vehicle),)) for key in PARAMETER_NAMES if key in values]
+    if "force" in groups and commanded:
+        # Commands alone determine thrust per mass: C_F and mass are labels of one number, which the path holds.
+        values = (values - {"thrust", "mass"}) | ({"lifted"} if "moment" in groups else set())
+    held_sd = 1e-6  # Relative one-sigma of a value that stays as believed.
+    terms = [value_term(key, vehicle) for key in PARAMETER_NAMES if key in values]
+    return [replace(t, kind="held", prior_sd=(held_sd,)) if t.key == "lifted" else t for t in terms]
+
+
+def value_term(key: str, vehicle: Vehicle) -> Term:
+    """The term of a believed value that is known by its trust."""
+    return Term(key, "value", prior_sd=(prior_of(key, vehicle),))
 
 
 def make_terms(vehicle: Vehicle, segments: list[Segment], groups) -> tuple[list[Term], dict[str, str]]:
     """Every term that this set can test, and the ids that it cannot, with the reason."""
-    terms, reasons = value_terms(vehicle, groups), {}
-    if any(s.command is not None and not s.measured_speed for s in segments):
-        # Commands alone determine thrust per mass: C_F and mass are labels of one number, which the path holds.
-        terms = [t for t in terms if t.key not in ("thrust", "mass")]
+    commanded = any(s.command is not None and not s.measured_speed for s in segments)
+    terms, reasons = value_terms(vehicle, groups, commanded), {}
     longest_sample = max(1.0 / s.rate_hz for s in segments)
     partner = {
         "offset:rotors-accelerometer": "force",
@@ -295,30 +307,6 @@ def guesses(form: Form, segments: list[Segment], vehicle: Vehicle, groups) -> tu
     if form.guess is None or "force" not in groups:
         return ()
     return form.guess([(s.motion, residual(s, vehicle)) for s in segments], vehicle)
-
-
-def form_terms(effect_id: str, form: Form, suggested: tuple[tuple[float, ...], ...] = ()) -> list[Term]:
-    """One term per starting point of a form's nonlinear parameters: those `suggested`, or else the form's own."""
-    starts = list(suggested) or [()]
-    for index in () if suggested else form.nonlinear:
-        starts = [s + (v,) for s in starts for v in form.parameters[index].starts]
-    terms = []
-    for number, start in enumerate(starts):
-        values = np.zeros(len(form.parameters))
-        values[list(form.nonlinear)] = start
-        suffix = f"#{number}" if len(starts) > 1 else ""
-        terms.append(
-            Term(
-                f"{effect_id}/{form.name}{suffix}",
-                "effect",
-                effect_id,
-                form,
-                tuple(values),
-                max(1, len(form.linear)),
-                (np.inf,) * max(1, len(form.linear)),
-            )
-        )
-    return terms
 
 
 @step("preparing")
@@ -545,7 +533,7 @@ def columns_of(
         elif term.kind == "effect":
             given = (*same, term.form, term.values)
             yield made((term.key,), given, segment.motion, partial(of_effect, term))
-        elif term.kind == "value":
+        elif term.kind in ("value", "held"):
             yield made((term.key,), (*same, measured_moment, for_comparison), flown.motion, partial(of_value, term))
         else:
             yield thinned([offset_columns(term.key, segment, vehicle, groups)])

@@ -1,74 +1,23 @@
-"""Believed values as the contract states them: their numbers, a vehicle with them changed, and what a curve leaves of
-what is said about them."""
+"""Believed values of a flight whose thrust has a curve, or is known by commands alone: there what the believed vehicle
+leaves, and values refitted where its rotors turn as they are commanded."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from rotorid.effects.catalogue import catalogue, ids_of
+from rotorid.effects.catalogue import ids_of
 from rotorid.effects.thrust_curve import SQUARE
-from rotorid.mismatch.decide import rules
-from rotorid.mismatch.decide.findings import Analysis, Finding
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.problem import Values
 from rotorid.mismatch.decide.status import CLAIMED, Estimate
-from rotorid.mismatch.decide.words import effect_words, listed
-from rotorid.mismatch.evidence.rows import PARAMETER_NAMES
-from rotorid.mismatch.flight.delivered import Values
-from rotorid.mismatch.flight.wrench import WrenchModel
+from rotorid.mismatch.decide.values import believed_value, changed_vehicle
+from rotorid.mismatch.evidence.rows import CHANNELS, Rows, residual
+from rotorid.mismatch.evidence.speedpath import CommandChain
+from rotorid.mismatch.flight.prepare import Prepared
+from rotorid.mismatch.flight.wrench import WrenchModel, caused
 from rotorid.recordings import RecordingSet, Vehicle, columns
-
-
-def believed_value(vehicle: Vehicle, key: str) -> float:
-    """The number that a value's name stands for (the mean over rotors of coefficients)."""
-    if key == "mass":
-        return vehicle.mass_kg
-    if key == "thrust":
-        return float(vehicle.thrust_coefficients_n_s2().mean())
-    if key == "torque":
-        return float(vehicle.torque_coefficients_n_m_s2().mean())
-    if key == "speed":
-        return vehicle.rotor_speed_limits_rad_s[1]
-    if key.startswith("inertia"):
-        return getattr(vehicle.inertia_kg_m2, key[-2:])
-    return 1.0  # an arm's or a reading's factor
-
-
-def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
-    """The vehicle with values changed by relative amounts."""
-    change = {}
-    for key, name in (("thrust", "thrust_coefficient_n_s2"), ("torque", "torque_coefficient_n_m_s2")):
-        if key in relative:
-            old = getattr(vehicle, name)
-            factor = 1 + relative[key]
-            change[name] = tuple(v * factor for v in old) if isinstance(old, tuple) else old * factor
-    if "mass" in relative:
-        change["mass_kg"] = vehicle.mass_kg * (1 + relative["mass"])
-    inertia = {k[-2:]: 1 + v for k, v in relative.items() if k.startswith("inertia")}
-    if inertia:
-        old = vehicle.inertia_kg_m2
-        change["inertia_kg_m2"] = old.model_copy(update={k: getattr(old, k) * f for k, f in inertia.items()})
-    if "speed" in relative:
-        low, high = vehicle.rotor_speed_limits_rad_s
-        change["rotor_speed_limits_rad_s"] = (low, high * (1 + relative["speed"]))
-    if "arm" in relative:
-        f = 1 + relative["arm"]
-        change["rotors"] = tuple(r.model_copy(update={"x_m": r.x_m * f, "y_m": r.y_m * f}) for r in vehicle.rotors)
-    return vehicle.model_copy(update=change)
-
-
-def contract_values(
-    vehicle: Vehicle, values: Values, names: Mapping[str, str] = PARAMETER_NAMES
-) -> dict[str, tuple[float, float, float, float]]:
-    """Wrong values under their names in the contract: believed, refitted and its interval."""
-    out = {}
-    for key, (relative, sd) in values.items():
-        believed = believed_value(vehicle, key)
-        out[names[key]] = tuple(
-            float(believed * (1 + x)) for x in (0.0, relative, relative - 1.96 * sd, relative + 1.96 * sd)
-        )
-    return out
 
 
 def only_throttle(recordings: RecordingSet) -> bool:
@@ -118,25 +67,48 @@ def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) 
     return [with_square if f is curve else f for f in findings], {k: v for k, v in values.items() if k != "thrust"}
 
 
-def with_values_in_question(analysis: Analysis) -> Analysis:
-    """The analysis with those wrong values only suggested that a member of an open class would change.
+GAINS_OF_COMMANDS = (0.5, 2.0)
+"""Factors of thrust and moments, from commands alone, within which they are values: commands that follow gusts feign a
+vehicle that does not answer, of which half a second ahead seems well predicted."""
 
-    Where it is a payload that is at work, the believed mass is right.
 
-    Asked once the words are final: a class that is only suggested questions nothing.
+def believed_residuals(
+    prepared: Prepared, rows: list[Rows], chain: CommandChain | None, times: float = 1.0
+) -> list[np.ndarray]:
+    """What the believed vehicle leaves of every stretch of a flight, (n, 12); where a `chain` is known by commands
+    alone, rotors turn `times` as fast as commanded, as far as commands are no answers."""
+    if chain is None:
+        return [r.y for r in rows]
+    out = []
+    for r, segment in zip(rows, prepared.segments, strict=True):
+        turning = replace(segment.motion, rotor_speed=times * caused(segment.command, segment.dt_s, chain))
+        left, groups = np.full_like(r.y, np.nan), residual(replace(segment, motion=turning), prepared.vehicle)
+        for index, group in enumerate(("force", "moment")):
+            if group in groups:
+                left[:, 3 * index : 3 * index + 3] = prepared.thinner(groups[group])
+        out.append(left)
+    return out
+
+
+def values_without_path(
+    believed: list[np.ndarray], faster: list[np.ndarray], fitted: int
+) -> tuple[Values, list[np.ndarray]]:
+    """Values refitted where rotors turn as commanded, and what they leave of every stretch, (n, 12).
+
+    By least squares on the first `fitted` stretches: one factor of the thrust, and one of each moment, which goes into
+    the inertia about its axis; what is beyond GAINS_OF_COMMANDS stays as believed. Given is what the `believed` vehicle
+    leaves, and what it leaves where its rotors turn √2 times as `faster`: thrust and moments go with the square.
     """
-    members = {i for f in analysis.findings if f.status == "ambiguous" for i in f.alternatives}
-    changing: dict[str, list[str]] = {}
-    for effect_id in sorted(members & set(catalogue())):
-        for name in catalogue()[effect_id].would_change:
-            if name in analysis.wrong_values:
-                changing.setdefault(name, []).append(effect_id)
-    if not rules.VALUE_IN_QUESTION(bool(changing)):
-        return analysis
-    names = {name: listed([effect_words(i) for i in ids], "or") for name, ids in changing.items()}
-    doubtful = {
-        name: (analysis.values[name], f"{words}, which is not excluded, would change it")
-        for name, words in names.items()
-    }
-    kept = {k: v for k, v in analysis.values.items() if k not in changing}
-    return replace(analysis, values=kept, suggested_values={**analysis.suggested_values, **doubtful})
+    made = [a - b for a, b in zip(believed, faster, strict=True)]
+    own, left = (np.concatenate(parts[:fitted])[:, 2:6] for parts in (made, believed))
+    known = np.isfinite(own) & np.isfinite(left)
+    own, left = np.where(known, own, 0.0), np.where(known, left, 0.0)
+    gain = 1.0 + (own * left).sum(axis=0) / np.maximum((own**2).sum(axis=0), 1e-300)
+    least, most = GAINS_OF_COMMANDS
+    gain = np.where((gain < least) | (gain > most), 1.0, gain)
+    lift, *moments = (float(g) for g in gain)
+    inertias = {f"inertia_{a}{a}": (lift / g - 1.0, 0.0) for a, g in zip("xyz", moments, strict=True)}
+    values = {"thrust": (lift - 1.0, 0.0), "torque": (lift - 1.0, 0.0), **inertias}
+    by_channel = np.ones(len(CHANNELS))
+    by_channel[:6] = [lift, lift, *gain]
+    return values, [a + (1.0 - by_channel) * m for a, m in zip(believed, made, strict=True)]

@@ -31,6 +31,7 @@ from rotorid.mismatch.evidence.rows import (
     Term,
     baseline_wrench,
     compared_alone,
+    form_terms,
     state_terms,
 )
 from rotorid.mismatch.evidence.speedpath import (
@@ -42,7 +43,7 @@ from rotorid.mismatch.evidence.speedpath import (
 )
 from rotorid.mismatch.evidence.split import training_rule
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
-from rotorid.mismatch.flight.prepare import Prepared, assemble_rows, form_terms
+from rotorid.mismatch.flight.prepare import Prepared, assemble_rows
 from rotorid.recordings import Vehicle
 from rotorid.recordings.columns import rotor_columns
 from rotorid.recordings.signal.kernels import causal
@@ -232,7 +233,7 @@ def searched(
     contributions = Contributions(rows, noisy, rate)
     per = max(2, int(rate))
 
-    values = [t.key for t in terms if t.kind == "value"]
+    values, held = ([t.key for t in terms if t.kind == kind] for kind in ("value", "held"))
     least_noise = np.concatenate([WORTH_STATING * floor[:6], floor[6:]])
     seconds = Seconds(rows, np.maximum(noise, least_noise), per)
 
@@ -240,7 +241,7 @@ def searched(
         # What refitted values would absorb of a term does not count as its size.
         short = any(t.key == key and t.run for t in terms)
         own = regression.columns([key])
-        cols, coefficients = regression.beyond(values, key, beta) if key not in values else (own, beta)
+        cols, coefficients = (own, beta) if key in (*values, *held) else regression.beyond(values, key, beta)
         return seconds.sizes(cols, coefficients, 1.0 if short else 0.9)
 
     # Winds of single runs are always in the model: fits of the search leave their many columns out.

@@ -25,7 +25,16 @@ from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS, Loading
 from rotorid.effects.throttle_curve import SLOPE
 from rotorid.mismatch.decide import rules
 from rotorid.mismatch.decide.enough import weighed
-from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Finding, with_probabilities
+from rotorid.mismatch.decide.findings import (
+    Analysis,
+    ChannelTrace,
+    Finding,
+    first_s,
+    next_flight,
+    on_traces,
+    with_probabilities,
+)
+from rotorid.mismatch.decide.problem import Values
 from rotorid.mismatch.decide.select import KEEP_P, SHARE_OF_LARGEST, Selection
 from rotorid.mismatch.decide.selected import (
     SMALLEST_CHANGE,
@@ -38,6 +47,9 @@ from rotorid.mismatch.decide.selected import (
     wrong_values,
 )
 from rotorid.mismatch.decide.status import CLAIMED, Estimate
+from rotorid.mismatch.decide.values import absorbed_findings, changed_vehicle, contract_values
+from rotorid.mismatch.decide.ways import in_words, residuals_of, settled
+from rotorid.mismatch.decide.words import TAKEN_UP
 from rotorid.mismatch.deliver.candidates import Candidate
 from rotorid.mismatch.deliver.files import claimed
 from rotorid.mismatch.deliver.final import Choice, delivered
@@ -45,11 +57,6 @@ from rotorid.mismatch.evidence.regression import Fit, Regression
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
-from rotorid.mismatch.flight.absent import absorbed_findings
-from rotorid.mismatch.flight.delivered import Values, in_words, residuals_of, settled
-from rotorid.mismatch.flight.fitted import TAKEN_UP, next_flight
-from rotorid.mismatch.flight.report_runs import first_s, on_traces
-from rotorid.mismatch.flight.values import changed_vehicle, contract_values
 from rotorid.mismatch.instrument.chain import (
     ChainResult,
     find_chain,

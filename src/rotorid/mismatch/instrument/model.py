@@ -25,9 +25,8 @@ from rotorid.mismatch.evidence.regression import (
     build,
     full_fit_residuals,
 )
-from rotorid.mismatch.evidence.rows import Contributions, Rows, Term, form_reading
+from rotorid.mismatch.evidence.rows import Contributions, Rows, Term, form_reading, form_terms
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
-from rotorid.mismatch.flight.prepare import form_terms
 from rotorid.mismatch.instrument.setup import SHORT, PreparedInstrument, averaged, has_weight, pieces_of, rotor_wrench
 from rotorid.recordings import Vehicle
 from rotorid.recordings.signal.kernels import causal

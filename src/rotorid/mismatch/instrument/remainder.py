@@ -13,10 +13,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import CHANNELS, InstrumentFacts, Loading, forms_of
 from rotorid.errors import InputError
-from rotorid.mismatch.decide.findings import Analysis
-from rotorid.mismatch.deliver.files import Instruments, instruments_of
-from rotorid.mismatch.evidence.rows import form_reading
-from rotorid.mismatch.flight.leftover import (
+from rotorid.mismatch.decide.dependence import (
     ALARM_P,
     SMALLEST_SHARE_OF_NOISE,
     Flexible,
@@ -24,6 +21,9 @@ from rotorid.mismatch.flight.leftover import (
     wald,
     with_products,
 )
+from rotorid.mismatch.decide.findings import Analysis
+from rotorid.mismatch.deliver.files import Instruments, instruments_of
+from rotorid.mismatch.evidence.rows import form_reading
 from rotorid.mismatch.instrument.model import MEMORY, ReadingModel
 from rotorid.mismatch.instrument.setup import averaged, full_voltage_of, loaded_by, pieces_of, with_speed
 from rotorid.recordings import Vehicle

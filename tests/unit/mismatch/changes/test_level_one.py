@@ -183,6 +183,15 @@ def test_a_name_that_contradicts_the_trims_is_refused_and_one_that_predicts_them
     assert left == [right] and refused == [wrong]
 
 
+def test_of_what_predicts_too_much_together_the_suggested_goes(good, later):
+    """Before, the larger part went: a payload that is established, because of a thrust that is only suggested."""
+    found = level_one(good, weaker(later, 3, 0.15))
+    established = change("unequal_rotors", d_3=-0.15)
+    suggested = replace(change("unequal_rotors", d_3=-0.12), status="suggested")
+    left, refused, _ = explaining([established, suggested], found, later.vehicle)
+    assert left == [established] and refused == [suggested]
+
+
 def test_every_kind_has_its_causes_its_share_of_the_false_alarms_and_ids_that_exist():
     assert CAUSES.keys() == BUDGET.keys() == KINDS.keys()
     assert {i for own in CAUSES.values() for i in own} <= catalogue().keys() | set(NAMES.values())

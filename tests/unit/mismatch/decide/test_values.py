@@ -74,3 +74,14 @@ def test_without_gains_or_values_nothing_is_wrong():
 def test_gains_that_are_not_known_say_nothing():
     only_thrust = options_of({"mass": LogGain(-0.2, 1e-4)}, TRUST, Prior())
     assert called_wrong(only_thrust, LEAST_NATS) in ({"mass"}, {"thrust"})
+
+
+def test_moments_that_are_all_larger_alike_are_a_heavier_vehicle_where_commands_alone_are_known():
+    """Thrust is then what lifts the believed mass. An arm and a torque coefficient say the same by two numbers."""
+    trust = {k: v for k, v in TRUST.items() if k not in ("mass", "thrust")} | {"lifted": 0.02}
+    moments = {key: LogGain(0.15, 1e-4) for key in GAINS if key != "mass"}
+    found = options_of(moments, trust, Prior())
+    assert called_wrong(found, LEAST_NATS) == {"lifted"}
+    assert {"arm", "torque"} in [set(other) for other in in_place(found, frozenset({"lifted"}), LEAST_NATS)["lifted"]]
+    roll_alone = options_of({**moments, **dict.fromkeys(GAINS[2:], LogGain(0.0, 1e-4))}, trust, Prior())
+    assert called_wrong(roll_alone, LEAST_NATS) == {"inertia_xx"}

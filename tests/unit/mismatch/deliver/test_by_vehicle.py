@@ -12,6 +12,7 @@ from rotorid.mismatch.evidence.rows import Term
 from rotorid.mismatch.flight.prepare import prepare
 from rotorid.recordings import templates
 from rotorid.vehicle.control import swings
+from tests.unit.mismatch.flights import as_commands, recorded, with_table
 
 NOISE = np.ones(12)
 DRAG = {"id": "rotor_drag", "form": "at the centre of mass", "parameters": {"k_d": 1e-4}}
@@ -75,3 +76,16 @@ def test_a_wrong_mass_does_not_spoil_the_drag(flown, wrong: float) -> None:
     assert found.improved.mass_kg == pytest.approx(flown.vehicle.mass_kg, rel=0.01)
     assert k_d.low < 1e-4 < k_d.high
     assert k_d.value == pytest.approx(1e-4, rel=0.02)
+
+
+def test_a_wrong_mass_is_one_wrong_value_where_commands_alone_are_recorded() -> None:
+    """Before: a scale of the rotors' distances and a torque coefficient that were off by as much as the mass was."""
+    flown = with_table(recorded(1, 2, 3, rate_hz=100.0), as_commands)
+    true = flown.vehicle
+    found = analyse(replace(flown, vehicle=true.model_copy(update={"mass_kg": true.mass_kg / 1.18})))
+    _, mass_kg, low, high = found.values["mass_kg"]
+    assert list(found.values) == ["mass_kg"] and low < true.mass_kg < high
+    assert (mass_kg, found.improved.mass_kg) == pytest.approx((true.mass_kg, true.mass_kg), rel=0.01)
+    # The commands are the speeds here: what lifts the vehicle is its true thrust.
+    made, wanted = (v.thrust_coefficients_n_s2() for v in (found.improved, true))
+    np.testing.assert_allclose(made, wanted, rtol=0.01)

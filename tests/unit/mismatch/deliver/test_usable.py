@@ -11,6 +11,7 @@ import pytest
 
 from rotorid.cli.modelling import fly, simulate
 from rotorid.errors import InputError
+from rotorid.mismatch.decide.values import changed_vehicle
 from rotorid.mismatch.deliver import usable
 from rotorid.mismatch.deliver.final import delivered_value
 from rotorid.mismatch.deliver.usable import (
@@ -22,13 +23,12 @@ from rotorid.mismatch.deliver.usable import (
     no_body,
     question_of,
     recorded_share,
-    with_only,
 )
 from rotorid.mismatch.evidence.rows import Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.fitted import fitted
 from rotorid.mismatch.flight.prepare import prepare
-from rotorid.mismatch.flight.values import changed_vehicle
+from rotorid.mismatch.flight.without import with_only
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.vehicle import Derivative

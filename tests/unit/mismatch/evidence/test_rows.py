@@ -143,7 +143,7 @@ def test_errors_of_sensors_reach_force_and_moment_through_mass_and_inertia():
 @pytest.mark.parametrize("key", ["thrust", "torque", "mass", "arm"])
 def test_a_value_that_is_one_percent_off_leaves_one_percent_of_its_column(key):
     """Flown with the true value, compared with the believed one."""
-    from rotorid.mismatch.flight.values import changed_vehicle
+    from rotorid.mismatch.decide.values import changed_vehicle
     from rotorid.vehicle.simulator import simulate
 
     believed, change = audit_vehicle(), 0.01

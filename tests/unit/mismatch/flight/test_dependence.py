@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
+from rotorid.mismatch.decide.dependence import wald, with_products
 from rotorid.mismatch.evidence.regression import autoregression
 from rotorid.mismatch.evidence.rows import Thinner
-from rotorid.mismatch.flight.leftover import kept_by_values, left_by, most_noise, probes, wald, with_products
+from rotorid.mismatch.flight.leftover import kept_by_values, left_by, most_noise, probes
 from tests.unit.mismatch.evidence.test_rows import one, still, thesis_vehicle
 from tests.unit.mismatch.synthetic import coloured
 

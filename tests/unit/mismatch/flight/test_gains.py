@@ -1,16 +1,17 @@
 """Gains by two bands and both sides: a slow moment of the air, and the controller's answer, bias what is slow."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rotorid.mismatch.decide.problem import LogGain, Prior
 from rotorid.mismatch.decide.selected import coefficients, relative_change
+from rotorid.mismatch.decide.ways import settled
 from rotorid.mismatch.evidence.split import parts_of, split_runs
-from rotorid.mismatch.flight.delivered import settled
 from rotorid.mismatch.flight.fitted import Fitted, fitted
-from rotorid.mismatch.flight.gains import Side, gains_of, mean_of, merged, shown_by_commands
+from rotorid.mismatch.flight.gains import Side, _trust_of, gains_of, mean_of, merged, shown_by_commands
 from rotorid.mismatch.flight.prepare import prepare
 from tests.unit.mismatch.flights import DENSE_HZ, quad, recorded, smooth, with_table
 
@@ -107,3 +108,11 @@ def test_commands_alone_show_no_moment_beyond_a_factor_of_two():
     """A yaw moment of an eighth is a controller that answers what turns the vehicle, not another rotor."""
     gains = {k: LogGain(np.log(x), 0.01) for k, x in (("mass", 2.5), ("inertia_xx", 0.6), ("inertia_zz", 0.12))}
     assert list(shown_by_commands(gains)) == ["mass", "inertia_xx"]
+
+
+def test_an_offset_of_the_centre_where_no_value_is_asked_for():
+    """Commands that only follow the motion determine no value: nothing is the least known of all."""
+    regression = SimpleNamespace(terms=[], keys_of=lambda *_: [])
+    search = SimpleNamespace(terms={"offset": SimpleNamespace(effect="com_offset")})
+    model = SimpleNamespace(regression=regression, search=search, selection=SimpleNamespace(active=["offset"]))
+    assert _trust_of(model) == {}

@@ -7,8 +7,7 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.describe import RECORDABLE, advice
-from rotorid.mismatch.decide.findings import Finding
-from rotorid.mismatch.flight.fitted import NextFlight, next_flight
+from rotorid.mismatch.decide.findings import Finding, NextFlight, next_flight
 from rotorid.recordings import RecordingSet, Run
 from tests.unit.mismatch.flights import recorded
 

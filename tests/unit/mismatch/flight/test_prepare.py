@@ -12,13 +12,13 @@ import pytest
 import rotorid.mismatch.flight.prepare as module
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
+from rotorid.mismatch.evidence.rows import form_terms
 from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedFit, SpeedResult
 from rotorid.mismatch.evidence.split import GAP_S, training_rule
 from rotorid.mismatch.flight.fitted import known_by_commands
 from rotorid.mismatch.flight.prepare import (
     DEFAULT_TRUST,
     LastMade,
-    form_terms,
     make_terms,
     prepare,
     prior_of,

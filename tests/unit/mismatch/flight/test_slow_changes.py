@@ -10,14 +10,9 @@ from rotorid.mismatch.flight.leftover import slow_excess
 from rotorid.mismatch.flight.prepare import prepare
 from rotorid.mismatch.flight.wrench import wrench_model
 from rotorid.recordings.columns import QUATERNION, VELOCITY
-from tests.unit.mismatch.flights import COLUMNS, quad, recorded, with_table
+from tests.unit.mismatch.flights import as_commands, quad, recorded, with_table
 
 RATE_HZ = 200.0
-
-
-def as_commands(table):
-    """The rotor speeds' columns as commands."""
-    return table.rename(columns={name: name.replace("speed", "command") for name in COLUMNS["rotors"]})
 
 
 def found(commanded: bool, slosh_m_s2: float, moves: bool = True) -> dict:

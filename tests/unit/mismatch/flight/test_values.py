@@ -9,9 +9,10 @@ import pytest
 
 from rotorid.mismatch.decide.select import Selection
 from rotorid.mismatch.decide.selected import SMALLEST_CHANGE, main_channels, relative_change, wrong_values
+from rotorid.mismatch.decide.values import with_values_in_question
 from rotorid.mismatch.evidence.regression import build
 from rotorid.mismatch.evidence.rows import Rows, Term
-from rotorid.mismatch.flight.values import with_square_term, with_thrust_per_command, with_values_in_question
+from rotorid.mismatch.flight.values import with_square_term, with_thrust_per_command
 from tests.unit.mismatch import synthetic
 from tests.unit.mismatch.evidence.test_regression import RATE_HZ
 from tests.unit.mismatch.flights import quad

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.mismatch.flight.delivered import values_without_path
+from rotorid.mismatch.flight.values import values_without_path
 
 
 def refitted(gains, fitted=1):

@@ -22,14 +22,7 @@ from rotorid.mismatch.decide.selected import WIDEST_TRUST, coefficients
 from rotorid.mismatch.decide.words import parameter_words
 from rotorid.mismatch.evidence.comparison import growth
 from rotorid.mismatch.evidence.regression import Fit, Regression
-from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES, Contributions, Rows, residual
-from rotorid.mismatch.evidence.speedpath import CommandChain
-from rotorid.mismatch.flight.prepare import Prepared
-from rotorid.mismatch.flight.wrench import caused
-
-GAINS_OF_COMMANDS = (0.5, 2.0)
-"""Factors of thrust and moments, from commands alone, within which they are values: commands that follow gusts feign a
-vehicle that does not answer, of which half a second ahead seems well predicted."""
+from rotorid.mismatch.evidence.rows import PARAMETER_NAMES, Contributions, Rows
 
 
 class FittedModel(Protocol):
@@ -112,48 +105,6 @@ def residuals_of(model: FittedModel, fit: Fit) -> list[np.ndarray]:
     named = np.where(model.unnamed(fit.columns), 0.0, fit.beta)
     added = model.contributions.of(fit.columns, named)
     return [r.y - part for r, part in zip(model.rows, added, strict=True)]
-
-
-def believed_residuals(
-    prepared: Prepared, rows: list[Rows], chain: CommandChain | None, times: float = 1.0
-) -> list[np.ndarray]:
-    """What the believed vehicle leaves of every stretch of a flight, (n, 12); where a `chain` is known by commands
-    alone, rotors turn `times` as fast as commanded, as far as commands are no answers."""
-    if chain is None:
-        return [r.y for r in rows]
-    out = []
-    for r, segment in zip(rows, prepared.segments, strict=True):
-        turning = replace(segment.motion, rotor_speed=times * caused(segment.command, segment.dt_s, chain))
-        left, groups = np.full_like(r.y, np.nan), residual(replace(segment, motion=turning), prepared.vehicle)
-        for index, group in enumerate(("force", "moment")):
-            if group in groups:
-                left[:, 3 * index : 3 * index + 3] = prepared.thinner(groups[group])
-        out.append(left)
-    return out
-
-
-def values_without_path(
-    believed: list[np.ndarray], faster: list[np.ndarray], fitted: int
-) -> tuple[Values, list[np.ndarray]]:
-    """Values refitted where rotors turn as commanded, and what they leave of every stretch, (n, 12).
-
-    By least squares on the first `fitted` stretches: one factor of the thrust, and one of each moment, which goes into
-    the inertia about its axis; what is beyond GAINS_OF_COMMANDS stays as believed. Given is what the `believed` vehicle
-    leaves, and what it leaves where its rotors turn √2 times as `faster`: thrust and moments go with the square.
-    """
-    made = [a - b for a, b in zip(believed, faster, strict=True)]
-    own, left = (np.concatenate(parts[:fitted])[:, 2:6] for parts in (made, believed))
-    known = np.isfinite(own) & np.isfinite(left)
-    own, left = np.where(known, own, 0.0), np.where(known, left, 0.0)
-    gain = 1.0 + (own * left).sum(axis=0) / np.maximum((own**2).sum(axis=0), 1e-300)
-    least, most = GAINS_OF_COMMANDS
-    gain = np.where((gain < least) | (gain > most), 1.0, gain)
-    lift, *moments = (float(g) for g in gain)
-    inertias = {f"inertia_{a}{a}": (lift / g - 1.0, 0.0) for a, g in zip("xyz", moments, strict=True)}
-    values = {"thrust": (lift - 1.0, 0.0), "torque": (lift - 1.0, 0.0), **inertias}
-    by_channel = np.ones(len(CHANNELS))
-    by_channel[:6] = [lift, lift, *gain]
-    return values, [a + (1.0 - by_channel) * m for a, m in zip(believed, made, strict=True)]
 
 
 def beyond_trust(model: FittedModel, values: Values, active: Sequence[str]) -> bool:

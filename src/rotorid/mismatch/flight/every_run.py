@@ -1,29 +1,19 @@
-"""The runs held out, opened once: what a model that was chosen without them makes of them, and what each effect is
-worth.
+"""The runs held out, opened once: what a model that was chosen without them makes of them.
 
 Nothing here can change the model. Effects, values and their numbers come from the runs that were fitted. What belongs
 to a run and not to the vehicle (the wind of a gust, when a payload is on board, a thrust per mass that differs from run
 to run) is read from the run itself: it says how the run was flown, not what the vehicle is.
-
-An effect is worth the difference between the model with it and the model without it, all else fitted anew, on runs that
-neither was fitted to.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from rotorid.effects.catalogue import ids_of
-from rotorid.mismatch.decide.findings import ChannelTrace, Finding
-from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import Fit
-from rotorid.mismatch.evidence.rows import CHANNELS, RUN_SCALE, Contributions, Rows, Term
-from rotorid.mismatch.evidence.speedpath import CommandChain
-from rotorid.mismatch.flight.delivered import Values, residuals_of, settled
+from rotorid.mismatch.evidence.rows import RUN_SCALE, Contributions, Rows, Term
 from rotorid.mismatch.flight.fitted import Fitted
 from rotorid.mismatch.flight.gusts import with_gusts_of_new_runs
 from rotorid.mismatch.flight.prepare import assemble_rows
@@ -62,16 +52,16 @@ def on_every_run(
     if model.segments and model.segments[0].motion.on_board is not None:
         own, noisy = _carrying(model, own, noisy)
     if model.segments and model.segments[0].motion.hung is not None:
-        own = hung(model, own, _rows_of(model, own), swinging_term(model)) or own
+        own = hung(model, own, rows_of(model, own), swinging_term(model)) or own
         noisy = like(own, noisy)
     gusts = ()
     if model.gusts:
-        own, noisy, gusts = with_gusts_of_new_runs(model, own, noisy, _rows_of(model, own))
+        own, noisy, gusts = with_gusts_of_new_runs(model, own, noisy, rows_of(model, own))
     known_noise = bool(model.noisy_segments) and bool(noisy or not own)
-    both = [*model.rows, *_rows_of(model, own)]
+    both = [*model.rows, *rows_of(model, own)]
     again = None
     if known_noise and model.contributions.noisy is not None:
-        again = [*model.contributions.noisy, *_rows_of(model, noisy)]
+        again = [*model.contributions.noisy, *rows_of(model, noisy)]
     whole = replace(
         prepared,
         recordings=recordings,
@@ -118,13 +108,13 @@ def as_flown(segments: list[Segment], found: Fitted) -> list[Segment]:
 def _carrying(model: WrenchModel, segments: list[Segment], noisy: list[Segment]):
     """Stretches that say when a payload is on board, found in their own loads."""
     every = [*model.segments, *segments]
-    rows = _rows_of(model, with_payload_on_board(every, [((-np.inf, np.inf),)] * len(every)))
+    rows = rows_of(model, with_payload_on_board(every, [((-np.inf, np.inf),)] * len(every)))
     windows = payload_windows_of(replace(model, rows=rows))[len(model.segments) :]
     windows = windows or [()] * len(segments)
     return with_payload_on_board(segments, windows), with_payload_on_board(noisy, windows) if noisy else noisy
 
 
-def _rows_of(model: WrenchModel, segments: list[Segment]) -> list[Rows]:
+def rows_of(model: WrenchModel, segments: list[Segment]) -> list[Rows]:
     """Rows of other stretches: the columns of what is in the model, at the places they have in the fitted rows.
 
     Columns that say nothing in a channel of the fitted rows (they are noise alone there) say nothing here either.
@@ -174,98 +164,3 @@ def _own_scale(model: WrenchModel, rows: list[Rows], fit: Fit, column: int, term
         own = r.x[:, known, column] / model.noise[known]
         top, bottom = top + float((own * left).sum()), bottom + float((own**2).sum())
     return top / bottom
-
-
-def without_each(
-    found: Fitted,
-    seen: WrenchModel,
-    values: Values,
-    fit: Fit,
-    findings: list[Finding],
-    traces: tuple[ChannelTrace, ...],
-) -> dict[str, tuple[np.ndarray, ...]]:
-    """To the id of every stated effect the residual (n,) of every trace without it, in the traces' order.
-
-    Parameters
-    ----------
-    found, seen
-        What was chosen, and the same with the rows of every run.
-    values, fit
-        The values called wrong, and what is delivered with all effects.
-    findings, traces
-        Those of the analysis. A mistake in the set has no model to leave it out of and is not in the answer.
-    """
-    out = {}
-    model, active = found.model, found.model.selection.active
-    for finding in findings:
-        if finding.status not in CLAIMED or finding.id in out:
-            continue
-        own = [k for k in active if model.search.terms[k].effect == finding.id]
-        in_chain = found.chain is not None and finding.id in {k for k, _ in found.chain.result.fit.chain}
-        if own:
-            fewer = settled(model, values, [k for k in active if k not in own])[0]
-            left = residuals_of(seen, scaled_by_run(seen, fewer))
-            out[finding.id] = on_traces(traces, seen.rows, left)
-        elif in_chain and found.measured:
-            out[finding.id] = _speeds_without(found, seen, finding.id, traces)
-        elif in_chain:
-            cutoff_hz = seen.prepared.thinner.cutoff_hz
-            segments = path_segments(seen.prepared.segments, chain_without(found, [finding.id]), cutoff_hz)
-            out[finding.id] = on_traces(traces, seen.rows, made_by(seen, segments, fit))
-        elif finding.id in ids_of("air_moves", "all the time") and seen.wind is not None:
-            still = [replace(s, motion=replace(s.motion, wind=without_wind(s, seen.wind))) for s in seen.segments]
-            out[finding.id] = on_traces(traces, seen.rows, made_by(seen, still, fit))
-        elif finding.id in ids_of("air_moves", "in windows") and seen.gusts:
-            steady = np.zeros(3) if seen.wind is None else np.array([*seen.wind, 0.0])
-            calm = [replace(s, motion=replace(s.motion, wind=steady)) for s in seen.segments]
-            out[finding.id] = on_traces(traces, seen.rows, made_by(seen, calm, fit))
-    return out
-
-
-def without_wind(segment, wind: np.ndarray) -> np.ndarray:
-    """A segment's wind less a steady one (north, east), m/s."""
-    return segment.motion.wind - np.array([*wind, 0.0])
-
-
-def chain_without(found: Fitted, ids: Sequence[str]) -> CommandChain:
-    """What lies between command and speed with fewer ids.
-
-    Fitted anew where speeds are measured and one goes. Where commands alone are, forces and moments are fitted with the
-    chain as it is: it stays so but for the ids, or the two would no longer belong together.
-    """
-    result = found.chain.result
-    return found.chain._replace(result=(result if found.measured else replace(result, without={})).less(ids))
-
-
-def made_by(model: WrenchModel, segments, fit: Fit) -> list[np.ndarray]:
-    """What a fit leaves of stretches that were changed, (n, 12) each."""
-    rows = _rows_of(model, segments)
-    named = np.where(model.unnamed(fit.columns), 0.0, fit.beta)
-    return [r.y - r.x[:, :, fit.columns] @ named for r in rows]
-
-
-def on_traces(
-    traces: Sequence[ChannelTrace], rows: Sequence[Rows], left: Sequence[np.ndarray]
-) -> tuple[np.ndarray, ...]:
-    """Residuals (n, channels) of every stretch on the traces; what is delivered where a trace is of none of them."""
-    known = {}
-    for r, part in zip(rows, left, strict=True):
-        known |= {(r.run, first_s(r.time_s), CHANNELS[k]): values for k, values in enumerate(part.T)}
-    return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.named) for t in traces)
-
-
-def _speeds_without(
-    found: Fitted, seen: WrenchModel, key: str, traces: tuple[ChannelTrace, ...]
-) -> tuple[np.ndarray, ...]:
-    """Measured less modelled rotor speeds on the traces, with one id less between command and speed."""
-    chain = chain_without(found, [key])
-    thinner, known = seen.prepared.thinner, {}
-    for r, segment in zip(seen.rows, seen.prepared.segments, strict=True):
-        left = thinner(segment.motion.rotor_speed - chain.speeds(segment))
-        known |= {(r.run, first_s(r.time_s), f"rotor_speed_{i + 1}"): own for i, own in enumerate(left.T)}
-    return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.named) for t in traces)
-
-
-def first_s(time_s: np.ndarray) -> float:
-    """First instant of a stretch; of one without rows infinity."""
-    return float(time_s[0]) if len(time_s) else np.inf

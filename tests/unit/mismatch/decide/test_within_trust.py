@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rotorid.mismatch.decide import ways
 from rotorid.mismatch.decide.selected import coefficient_of, relative_change
+from rotorid.mismatch.decide.ways import beyond_trust, in_words, settled
 from rotorid.mismatch.evidence.regression import Fit
-from rotorid.mismatch.flight import delivered
-from rotorid.mismatch.flight.delivered import beyond_trust, in_words, settled
 
 TRUST = {"thrust": 0.05, "mass": 0.005}
 
@@ -42,8 +42,8 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
         better = len(keys) == len(TRUST)
         return [noise * (0.5 if better and helps else 1.0)]
 
-    monkeypatch.setattr(delivered, "left_out_residuals", residuals)
-    monkeypatch.setattr(delivered, "judged_rows", lambda *_: [np.ones(4000, bool)])
+    monkeypatch.setattr(ways, "left_out_residuals", residuals)
+    monkeypatch.setattr(ways, "judged_rows", lambda *_: [np.ones(4000, bool)])
     return model
 
 
