@@ -184,7 +184,7 @@ class _Width:
 def _able(known: FittedSet) -> dict[str, tuple[str, ...]]:
     """To everything that can be wished for its terms: believed values, and effects that are not at work."""
     search, active = known.model.search, known.model.selection.active
-    out = {name: (key,) for key, name in PARAMETER_NAMES.items() if key in search.always}
+    out = {PARAMETER_NAMES[key]: (key,) for key in search.regression.keys_of("value")}
     at_work = {search.terms[k].effect for k in active}
     for key, term in search.terms.items():
         if term.kind == "effect" and not term.run and term.effect not in (at_work | UNKNOWNS.keys()):
