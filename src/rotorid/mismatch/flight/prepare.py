@@ -261,9 +261,9 @@ def value_terms(vehicle: Vehicle, groups: Sequence[str], commanded: bool = False
     values = {"thrust", "mass"} if "force" in groups else set()
     if "moment" in groups:
         values |= {"thrust", "torque", "inertia_xx", "inertia_yy", "inertia_zz", "arm"}
-    if "force" in groups and commanded:
+    if commanded:
         # Commands alone determine thrust per mass: C_F and mass are labels of one number, which the path holds.
-        values = (values - {"thrust", "mass"}) | ({"lifted"} if "moment" in groups else set())
+        values = (values - {"thrust", "mass"}) | ({"lifted"} if {"force", "moment"} <= {*groups} else set())
     held_sd = 1e-6  # Relative one-sigma of a value that stays as believed.
     terms = [value_term(key, vehicle) for key in PARAMETER_NAMES if key in values]
     return [replace(t, kind="held", prior_sd=(held_sd,)) if t.key == "lifted" else t for t in terms]

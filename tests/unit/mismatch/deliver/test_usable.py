@@ -1,5 +1,5 @@
-"""A delivered vehicle is a body that hovers and flies. The model of a flight with fewer of its parts. A vehicle of
-one central rotor, of which the collective alone is known.
+"""A delivered vehicle is a body that hovers and flies. A vehicle of one central rotor, of which the collective alone is
+known.
 """
 
 import inspect
@@ -24,18 +24,12 @@ from rotorid.mismatch.deliver.usable import (
     question_of,
     recorded_share,
 )
-from rotorid.mismatch.evidence.rows import Term
-from rotorid.mismatch.evidence.split import parts_of, split_runs
-from rotorid.mismatch.flight.fitted import fitted
-from rotorid.mismatch.flight.prepare import prepare
-from rotorid.mismatch.flight.without import with_only
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.vehicle import Derivative
 from rotorid.report.deliver import analysis_of
 from rotorid.vehicle.control import FLIGHTS, SECONDS, SEED
 from rotorid.vehicle.mixer import allocation_matrix
-from tests.unit.mismatch.flights import recorded
 from tests.unit.vehicle.thesis import thesis_vehicle
 
 LIMITS = {"rotor_speed_limits_rad_s": (0.0, 1600.0)}
@@ -179,21 +173,6 @@ def test_an_export_that_the_estimates_cost_is_said_and_the_vehicle_stays():
         f"The improved vehicle cannot be exported as {f}" for f in ("mjcf", "sdf")
     ]
     assert exports_lost(flat, flat) == ()
-
-
-def test_a_model_without_its_wind_has_the_terms_of_its_rows():
-    """Terms that no column belongs to any more stopped the stage where believed values were judged anew."""
-    made = recorded(1, 2, 3, flight={"square_drag": 0.06, "excitation": 1.5, "wind": (-1.0, 3.0)})
-    found = fitted(prepare(parts_of(made, split_runs(made))[0]))
-    assert found.model.wind is not None and "wind" in {t.kind for t in found.model.terms}
-    calm = with_only(found, {"frame_drag"}, {}).model
-    assert calm.wind is None and keys(calm.terms) == keys(calm.regression.terms)
-    assert "wind" not in {t.kind for t in calm.terms}
-
-
-def keys(terms: list[Term]) -> list[str]:
-    """Keys of terms."""
-    return [t.key for t in terms]
 
 
 FULL_RAD_S = 1500.0

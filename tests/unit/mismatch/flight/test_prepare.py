@@ -279,3 +279,10 @@ def test_commands_alone_show_no_curve_of_the_thrust_and_where_they_follow_the_mo
     gone = keys - {t.key for t in left.terms}
     assert {"arm", "torque", "inertia_xx", "inertia_yy", "inertia_zz"} <= gone
     assert "com_offset" in {t.effect for t in left.terms} and "rotational_damping" in left.not_testable
+
+
+@pytest.mark.parametrize("groups", [("force", "moment"), ("moment",), ("force",)])
+def test_commands_alone_know_neither_thrust_nor_mass_but_what_the_moments_say_of_what_they_lift(groups):
+    keys = {t.key: t.kind for t in module.value_terms(quad(), groups, commanded=True)}
+    assert not {"thrust", "mass"} & keys.keys()
+    assert keys.get("lifted") == ("held" if len(groups) == 2 else None)
